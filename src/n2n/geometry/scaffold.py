@@ -1,0 +1,77 @@
+"""A coarse oriented surface from local fits: it tells a field where inside is, before any learning."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from n2n.geometry.local_fit import project_to_quadric
+from n2n.geometry.orientation import orient, winding_number
+from n2n.geometry.scale import Scales
+
+_MAX_POINTS = 3000
+_AREA_NEIGHBOURS = 9
+
+
+@dataclass(frozen=True)
+class Scaffold:
+    """Oriented samples of the surface.
+
+    Attributes:
+        points: (n, 3) positions on local fits, unit coordinates.
+        normals: (n, 3) unit normals, outwards.
+        areas: (n,) surface area of each sample.
+    """
+
+    points: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    areas: NDArray[np.float64]
+
+    @classmethod
+    def build(cls, cloud: NDArray[np.float64], scales: Scales, seed: int = 0) -> "Scaffold":
+        """Thin the cloud evenly, project it onto local quadrics and orient the normals globally.
+
+        Args:
+            cloud: (n, 3) noisy points, unit coordinates.
+            scales: Their noise and spacing.
+            seed: Chooses the samples and seeds the orientation search.
+        """
+        generator = np.random.default_rng(seed)
+        tree = cKDTree(cloud)
+        samples = cloud[_thin(cloud, _MAX_POINTS, generator)]
+        points, normals = project_to_quadric(tree, samples, max(2 * scales.patch if scales.patch < 48 else scales.patch, 32))
+        k = min(_AREA_NEIGHBOURS, len(points))
+        reach = cKDTree(points).query(points, k)[0][:, -1]
+        areas = np.pi * reach**2 / k
+        return cls(points, orient(points, normals, areas, seed), areas)
+
+    def sign(self, queries: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return -1 where the winding number says inside and +1 elsewhere, (q,)."""
+        return np.where(winding_number(queries, self.points, self.normals, self.areas) > 0.5, -1.0, 1.0)
+
+    def normals_at(self, queries: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Flip (q, 3) unoriented normals to agree with the nearest samples."""
+        nearest = cKDTree(self.points).query(queries, min(4, len(self.points)))[1].reshape(len(queries), -1)
+        vote = np.einsum("qi,qki->qk", normals, self.normals[nearest])
+        flip = (vote * np.abs(vote)).sum(axis=1) < 0
+        return np.where(flip[:, None], -normals, normals)
+
+
+def _thin(cloud: NDArray[np.float64], count: int, generator: np.random.Generator) -> NDArray[np.int64]:
+    """Return about `count` row indices, at most one per voxel of the size that leaves that many."""
+    order = generator.permutation(len(cloud))
+    if len(cloud) <= count:
+        return order
+    low, high = 0.0, float(np.ptp(cloud, axis=0).max())
+    chosen = order[:count]
+    for _ in range(20):
+        voxel = (low + high) / 2
+        _, first = np.unique(np.floor(cloud[order] / voxel).astype(np.int64), axis=0, return_index=True)
+        if len(first) > count:
+            low = voxel
+        else:
+            chosen, high = order[first], voxel
+            if len(first) > 0.95 * count:
+                break
+    return chosen
