@@ -50,7 +50,7 @@ class Grid(SDF):
         self.shape = [c * 2 ** (levels - 1) for c in coarse]
         self.voxel = float(voxel)
         size = torch.tensor(self.shape, dtype=torch.float32) * voxel
-        middle = torch.tensor([(a + b) / 2 for a, b in zip(lower, upper, strict=True)])
+        middle = torch.tensor([(a + b) / 2 for a, b in zip(lower, upper, strict=True)], dtype=torch.float32)
         self.register_buffer("lower", middle - size / 2)
         self.register_buffer("size", size)
         self.register_buffer("band", torch.zeros(num_conditions, *self.shape))

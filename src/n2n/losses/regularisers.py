@@ -1,0 +1,105 @@
+"""The regulariser R of Eq. 7 and its variants: pure terms that look at one `FieldState`."""
+
+import torch
+from torch import Tensor
+
+from n2n.losses.state import FieldState
+from n2n.shapes import Points
+
+
+def nearest_distance(points: Points, cloud: Points, chunk: int = 4096) -> Tensor:
+    """Return the distance of each point to its nearest cloud point; differentiable in both, finite slope at zero."""
+    parts = []
+    for start in range(0, len(points), chunk):
+        part = points[start : start + chunk]
+        with torch.no_grad():
+            index = torch.cdist(part, cloud).argmin(dim=1)
+        squared = (part - cloud[index]).square().sum(-1)
+        parts.append(squared.clamp_min(1e-20).sqrt())
+    return torch.cat(parts)
+
+
+class NoRegulariser:
+    """R = 0."""
+
+    def __call__(self, state: FieldState) -> Tensor:
+        return state.value.new_zeros(())
+
+
+class Consistency:
+    """Geometric consistency: mean over queries of max(0, |f(n)| - distance of n to the denoised points).
+
+    F(n) lies exactly |f(n)| from n, so the excess is never negative and measures by how much another denoised point is
+    closer than the one n was pulled to.
+
+    Args:
+        against: `batch` (the pulled batch, as printed) or `larger` (the batch and the larger denoised set).
+
+    Source: Ma et al. 2023, Eq. 6.
+    """
+
+    def __init__(self, against: str = "batch") -> None:
+        if against not in ("batch", "larger"):
+            raise ValueError(f"against must be 'batch' or 'larger', got {against!r}")
+        self.against = against
+
+    def __call__(self, state: FieldState) -> Tensor:
+        cloud = state.pulled
+        if self.against == "larger" and state.denoised is not None:
+            cloud = torch.cat([cloud, state.denoised])
+        return (state.value.abs() - nearest_distance(state.queries, cloud)).relu().mean()
+
+
+class ConsistencyTarget:
+    """The released code's variant: mean distance of each denoised point to the nearest noisy target.
+
+    Source: script released with Ma et al. 2023. Differs from Eq. 6, which measures queries against denoised points.
+    """
+
+    def __call__(self, state: FieldState) -> Tensor:
+        return nearest_distance(state.pulled, state.targets).mean()
+
+
+class ZeroLevel:
+    """Mean |f(F(n))|: pulled points lie on the zero level set. Offered by the released code as more robust."""
+
+    def __call__(self, state: FieldState) -> Tensor:
+        return state.evaluate(state.pulled)[0].abs().mean()
+
+
+class Eikonal:
+    """Mean (||grad f|| - 1)^2: f is a distance.
+
+    Args:
+        at: `queries` or `targets`.
+
+    Source: Gropp et al. 2020, Implicit Geometric Regularization, Eq. 2.
+    """
+
+    def __init__(self, at: str = "queries") -> None:
+        if at not in ("queries", "targets"):
+            raise ValueError(f"at must be 'queries' or 'targets', got {at!r}")
+        self.at = at
+
+    def __call__(self, state: FieldState) -> Tensor:
+        gradient = state.gradient if self.at == "queries" else state.at_targets[1]
+        norm = gradient.square().sum(-1).clamp_min(1e-20).sqrt()
+        return (norm - 1).square().mean()
+
+
+class OnSurface:
+    """Mean f(t)^2 over the noisy targets.
+
+    This is the noise-to-noise distance of a cloud to itself (Eq. 5 allows i = j): every F(t) is matched to its own t,
+    which costs |F(t) - t| = |f(t)|.
+    """
+
+    def __call__(self, state: FieldState) -> Tensor:
+        return state.at_targets[0].square().mean()
+
+
+class Smoothness:
+    """Thin-plate energy of the field around the surface: the integral of ||Hessian f||^2 over the field's band."""
+
+    def __call__(self, state: FieldState) -> Tensor:
+        return state.field.roughness(state.generator)
