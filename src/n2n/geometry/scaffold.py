@@ -12,6 +12,7 @@ from n2n.geometry.scale import Scales
 
 _MAX_POINTS = 3000
 _AREA_NEIGHBOURS = 9
+_FAR_POSITIONS = 20_000
 
 
 @dataclass(frozen=True)
@@ -50,12 +51,13 @@ class Scaffold:
         """Return -1 where the winding number says inside and +1 elsewhere, (q,)."""
         return np.where(winding_number(queries, self.points, self.normals, self.areas) > 0.5, -1.0, 1.0)
 
-    def normals_at(self, queries: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Flip (q, 3) unoriented normals to agree with the nearest samples."""
-        nearest = cKDTree(self.points).query(queries, min(4, len(self.points)))[1].reshape(len(queries), -1)
-        vote = np.einsum("qi,qki->qk", normals, self.normals[nearest])
-        flip = (vote * np.abs(vote)).sum(axis=1) < 0
-        return np.where(flip[:, None], -normals, normals)
+    def far_field(
+        self, lower: NDArray[np.float64], upper: NDArray[np.float64], margin: float, seed: int = 0
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return random positions of the box farther than `margin` from the samples, (m, 3), and their signs, (m,)."""
+        positions = np.random.default_rng(seed).uniform(lower, upper, (_FAR_POSITIONS, 3))
+        positions = positions[cKDTree(self.points).query(positions)[0] > margin]
+        return positions, self.sign(positions)
 
 
 def _thin(cloud: NDArray[np.float64], count: int, generator: np.random.Generator) -> NDArray[np.int64]:

@@ -1,13 +1,14 @@
 """The regulariser R of Eq. 7 and its variants: pure terms that look at one `FieldState`."""
 
 import torch
+from jaxtyping import Float
 from torch import Tensor
 
 from n2n.losses.state import FieldState
 from n2n.shapes import Points
 
 
-def nearest_distance(points: Points, cloud: Points, chunk: int = 4096) -> Tensor:
+def nearest_distance(points: Points, cloud: Float[Tensor, "m 3"], chunk: int = 4096) -> Tensor:
     """Return the distance of each point to its nearest cloud point; differentiable in both, finite slope at zero."""
     parts = []
     for start in range(0, len(points), chunk):

@@ -5,9 +5,26 @@ from functools import cached_property
 from typing import Any
 
 import torch
+from jaxtyping import Float
 from torch import Tensor
 
 from n2n.shapes import Index, Points, Values
+
+
+@dataclass(frozen=True)
+class Guide:
+    """What the data says about inside and outside before any learning.
+
+    Attributes:
+        points, normals: Oriented samples of the surface (normals outwards), (s, 3) each.
+        far_points: Positions of the box that are clearly off the surface, (m, 3).
+        far_signs: -1 inside, +1 outside, (m,).
+    """
+
+    points: Points
+    normals: Points
+    far_points: Float[Tensor, "m 3"]
+    far_signs: Float[Tensor, " m"]
 
 
 @dataclass
@@ -22,6 +39,8 @@ class FieldState:
         targets: Noisy points the queries are matched to.
         condition: Index of the shape the batch is from.
         denoised: A larger denoised set of the same shape, detached, or None.
+        guide: Oriented surface samples and signs far from the surface, or None.
+        far: Positions off the surface and their signed distances to the denoised set, or None.
         progress: Finished share of the fit, 0 to 1.
         generator: CPU generator of this step.
     """
@@ -31,9 +50,11 @@ class FieldState:
     value: Values
     gradient: Points
     pulled: Points
-    targets: Points
+    targets: Float[Tensor, "t 3"]
     condition: int = 0
-    denoised: Points | None = None
+    denoised: Float[Tensor, "m 3"] | None = None
+    guide: Guide | None = None
+    far: tuple[Tensor, Tensor] | None = None
     progress: float = 0.0
     generator: torch.Generator = field(default_factory=torch.Generator)
 

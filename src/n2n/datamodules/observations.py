@@ -1,0 +1,114 @@
+"""The data of a fit: noisy observations of one or several shapes, in unit coordinates, drawn in pairs."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import lightning as L
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch.utils.data import DataLoader, IterableDataset
+
+from n2n.errors import InputError
+from n2n.geometry.frame import Frame
+
+PAIRS = ("random", "same")
+
+
+@dataclass
+class Draw:
+    """One pair (i, j) of observations of one shape (Eq. 5).
+
+    Attributes:
+        source, target: N_i and N_j, (n, 3) unit coordinates; several observations merged where they are small.
+        same: i = j.
+        key: Names N_i while it is a single observation, so that what only depends on it is computed once.
+        condition: Which shape.
+    """
+
+    source: torch.Tensor
+    target: torch.Tensor
+    same: bool
+    key: int | None
+    condition: int
+
+
+class ObservationsDataModule(L.LightningDataModule):
+    """Observations held in memory.
+
+    Attributes:
+        frames: One world <-> unit map per shape.
+        shapes: Per shape its observations, (n_i, 3) float32 unit coordinates.
+
+    Args:
+        shapes: Per shape its observations, (n_i, 3) float64 world coordinates; point counts may differ.
+        num_observations: N, how many observations of each shape to use; None uses all.
+    """
+
+    def __init__(self, shapes: list[list[NDArray[np.float64]]], num_observations: int | None = None) -> None:
+        super().__init__()
+        if not shapes or not all(shapes):
+            raise InputError("no observations given; pass at least one noisy point cloud")
+        self.frames, self.shapes = [], []
+        for clouds in shapes:
+            used = clouds if num_observations is None else clouds[:num_observations]
+            if num_observations is not None and len(used) < num_observations:
+                raise InputError(
+                    f"num_observations={num_observations}, but only {len(used)} given; add observations or lower it"
+                )
+            frame = Frame.fit(used)
+            self.frames.append(frame)
+            self.shapes.append([torch.as_tensor(frame.to_unit(c), dtype=torch.float32) for c in used])
+        self._blocks: dict[str, Any] = {"pairs": "random", "points": None, "seed": 0, "first": 0}
+
+    def configure_draws(self, pairs: str, points: int, seed: int, first: int = 0, step: int = 1) -> None:
+        """Say how pairs are drawn.
+
+        Args:
+            pairs: `random` (i and j independent, as in Eq. 5) or `same` (i = j).
+            points: Observations are merged until a draw holds this many points.
+            seed: Of the draws.
+            first: Iteration to start at (a resumed fit).
+            step: Iterations per draw.
+        """
+        self._blocks = {"pairs": pairs, "points": points, "seed": seed, "first": first, "step": step}
+
+    def train_dataloader(self) -> DataLoader:
+        return DataLoader(_Draws(self.shapes, **self._blocks), batch_size=None)
+
+    def transfer_batch_to_device(self, batch: Draw, device: torch.device, dataloader_idx: int) -> Draw:
+        batch.source, batch.target = batch.source.to(device), batch.target.to(device)
+        return batch
+
+
+class _Draws(IterableDataset):
+    """An endless stream of draws; the draw at iteration t depends on the seed and t alone."""
+
+    def __init__(
+        self, shapes: list[list[torch.Tensor]], pairs: str, points: int, seed: int, first: int = 0, step: int = 1
+    ) -> None:
+        self.shapes, self.pairs, self.points = shapes, pairs, points
+        self.seed, self.first, self.step = seed, first, step
+
+    def __iter__(self):
+        iteration = self.first
+        while True:
+            yield self.draw(iteration)
+            iteration += self.step
+
+    def draw(self, iteration: int) -> Draw:
+        random = np.random.default_rng([self.seed, iteration])
+        condition = int(random.integers(len(self.shapes)))
+        clouds = self.shapes[condition]
+        count = min(len(clouds), max(1, -(-self.points // max(len(clouds[0]), 1))))
+        first = random.choice(len(clouds), count, replace=False)
+        second = first if self.pairs == "same" or len(clouds) == 1 else random.choice(len(clouds), count, replace=False)
+        same = bool((first == second).all())
+        source = _merge([clouds[i] for i in first])
+        target = source if same else _merge([clouds[j] for j in second])
+        key = int(first[0]) + 1_000_000 * condition if count == 1 else None
+        return Draw(source, target, same, key, condition)
+
+
+def _merge(clouds: list[torch.Tensor]) -> torch.Tensor:
+    return clouds[0] if len(clouds) == 1 else torch.cat(clouds)

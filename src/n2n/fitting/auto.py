@@ -1,0 +1,113 @@
+"""Scale parameters chosen from the data: everywhere a configuration says `auto`.
+
+Two lengths are measured in unit coordinates, the noise sigma and the spacing (square root of the area per point, all
+observations counted together); every scale of the fast recipe follows from them. docs/method.md derives the rules and
+shows the measurements behind the constants.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from n2n.geometry.scale import Scales, estimate_scales
+
+AUTO = "auto"
+
+_PROBED_POINTS = 20_000
+_NOISE_FLOOR = 0.05  # of the spacing: a clean cloud still has one length that limits what can be known
+_VOXEL = 0.33
+_STIFFNESS = 2.0
+_THIN_PLATE = 6.5e-3
+_BAND_VOXELS = 3.0
+_MAX_BATCH = 65_536
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """What the data decided, unit coordinates.
+
+    Attributes:
+        noise: Deviation of the noise along the normal, at least 5 % of the spacing.
+        spacing: Square root of the area per point over all observations.
+        area: Surface area.
+        lower, upper: Box of the field.
+        voxel: Finest cell of the grid.
+        band: Half width of the zone around the data where smoothness is asked for.
+        margin: Distance beyond which the sign of the scaffold is trusted.
+        batch_size: Points matched at once.
+    """
+
+    noise: float
+    spacing: float
+    area: float
+    lower: tuple[float, float, float]
+    upper: tuple[float, float, float]
+    voxel: float
+    band: float
+    margin: float
+    batch_size: int
+
+    def values(self, config: dict[str, Any]) -> dict[str, Any]:
+        """Return the values of the configuration's `auto` fields by dotted name."""
+        stiffness = (_STIFFNESS * self.noise) ** 2
+        # The weights balance a squared distance; a distance of exponent 1 is larger by 1 / noise.
+        unit = self.noise ** (config["distance"].get("p", 1) - 2)
+        return {
+            "batch_size": self.batch_size,
+            "queries.scale": 0.5 * self.noise,
+            "architecture.voxel": self.voxel,
+            "terms.eikonal.weight": stiffness * unit,
+            "terms.smoothness.weight": _THIN_PLATE * self.noise * self.spacing / self.area * unit,
+            "terms.scaffold.weight": unit,
+            "terms.scaffold.normal_weight": stiffness,
+            "terms.far_field.weight": 5 * self.noise**2 * unit,
+        }
+
+
+def measure(observations: list[NDArray[np.float64]], seed: int = 0) -> tuple[Scales, NDArray[np.float64]]:
+    """Estimate the scales of all observations together from a sample of them.
+
+    Returns:
+        Scales with the spacing of the *merged* observations, and the sample (at most 20 000 points).
+    """
+    generator = np.random.default_rng(seed)
+    chosen: list[NDArray[np.float64]] = []
+    for index in generator.permutation(len(observations)):
+        chosen.append(observations[index])
+        if sum(map(len, chosen)) >= _PROBED_POINTS:
+            break
+    pool = np.concatenate(chosen)
+    if len(pool) > _PROBED_POINTS:
+        pool = pool[generator.choice(len(pool), _PROBED_POINTS, replace=False)]
+    scales = estimate_scales(pool, seed)
+    total = sum(map(len, observations))
+    return replace(scales, spacing=float(np.sqrt(scales.area / total))), pool
+
+
+def choose(scales: Scales, observations: list[NDArray[np.float64]]) -> Chosen:
+    """Turn measured scales into the parameters of the fast recipe."""
+    noise = max(scales.noise, _NOISE_FLOOR * scales.spacing)
+    voxel = _VOXEL * (noise * scales.spacing) ** 0.25
+    pad = max(0.12, 4 * noise)
+    lower = np.min([points.min(axis=0) for points in observations], axis=0) - pad
+    upper = np.max([points.max(axis=0) for points in observations], axis=0) + pad
+    return Chosen(
+        noise=noise,
+        spacing=scales.spacing,
+        area=scales.area,
+        lower=tuple(float(x) for x in lower),
+        upper=tuple(float(x) for x in upper),
+        voxel=voxel,
+        band=_BAND_VOXELS * voxel,
+        margin=max(3 * noise, 2 * voxel),
+        batch_size=min(max(map(len, observations)), _MAX_BATCH),
+    )
+
+
+def fill(config: Any, values: dict[str, Any], path: str = "") -> Any:
+    """Return a copy of nested dicts with every `auto` replaced by the value of its dotted name."""
+    if isinstance(config, dict):
+        return {key: fill(item, values, f"{path}.{key}" if path else str(key)) for key, item in config.items()}
+    return values.get(path, config) if config == AUTO else config

@@ -1,0 +1,195 @@
+"""One fit from observations to a trained field: measure, choose, assemble, train."""
+
+import logging
+import time
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import lightning as L
+import numpy as np
+import torch
+from lightning.pytorch.callbacks import ModelCheckpoint
+
+from n2n.architectures.base import SDF
+from n2n.datamodules.observations import ObservationsDataModule
+from n2n.errors import ConfigError
+from n2n.fitting.assemble import build_field, build_objective, build_optimizer
+from n2n.fitting.auto import AUTO, Chosen, choose, fill, measure
+from n2n.fitting.callbacks import ProgressReport, Report
+from n2n.fitting.module import FitModule
+from n2n.geometry.frame import Frame
+from n2n.geometry.scaffold import Scaffold
+from n2n.losses.state import Guide
+
+LAST_CHECKPOINT = "last.ckpt"
+
+
+@dataclass
+class FitResult:
+    """A trained field with everything needed to use it again.
+
+    Attributes:
+        field: In evaluation mode, on the device it was trained on.
+        frames: World <-> unit map of each shape.
+        config: The configuration with every `auto` filled in.
+        report: Measured scales, iterations, seconds, final loss.
+    """
+
+    field: SDF
+    frames: list[Frame]
+    config: dict[str, Any]
+    report: dict[str, Any]
+
+
+def fit(
+    data: ObservationsDataModule,
+    config: dict[str, Any],
+    run_dir: Path | None = None,
+    report: Report | None = None,
+    logger: Any = False,
+) -> FitResult:
+    """Fit one field to the observations.
+
+    Args:
+        data: Observations of one or several shapes.
+        config: Nested plain dict as composed from conf/; `auto` values are chosen here from the data.
+        run_dir: Where checkpoints go; an unfinished fit found there is resumed. None keeps nothing.
+        report: Told about progress.
+        logger: A Lightning logger, or False.
+    """
+    start = time.perf_counter()
+    seed = config["seed"]
+    torch.manual_seed(seed)
+    device = pick_device(config["device"])
+    chosen, guides = _prepare(data, config)
+    config = _fill_config(config, chosen)
+    field = build_field(config, len(data.shapes))
+    if config["scaffold"]:
+        for condition, clouds in enumerate(data.shapes):
+            field.set_band(torch.cat(clouds[:50]), chosen[condition].band, condition)
+    objective = build_objective(config, [_to_device(guide, device) for guide in guides])
+    optimizer, scheduler = build_optimizer(config)
+    iterations, plan_reuse = config["iterations"], config["plan_reuse"]
+    module = FitModule(field, objective, optimizer, scheduler, iterations, plan_reuse, seed)
+    prepared = time.perf_counter()
+
+    resume = _resume_from(run_dir)
+    first = _iteration_of(resume) if resume else 0
+    data.configure_draws(config["pairs"], config["batch_size"], seed, first, plan_reuse)
+    callbacks: list[L.Callback] = [ProgressReport(report)] if report else []
+    if run_dir:
+        every = max(1, config["checkpoint_every"] // plan_reuse)
+        callbacks.append(
+            ModelCheckpoint(
+                run_dir, filename="last", every_n_train_steps=every * plan_reuse, enable_version_counter=False
+            )
+        )
+    with quiet_lightning():
+        trainer = L.Trainer(
+            max_steps=iterations,
+            accelerator="gpu" if device.type == "cuda" else device.type,
+            devices=1,
+            logger=logger,
+            callbacks=callbacks,
+            enable_checkpointing=bool(run_dir),
+            enable_progress_bar=False,
+            enable_model_summary=False,
+            inference_mode=False,
+            log_every_n_steps=1,
+            num_sanity_val_steps=0,
+        )
+        if first < iterations:
+            trainer.fit(module, data, ckpt_path=resume, weights_only=True if resume else None)
+    field = module.field.eval().to(device)
+    return FitResult(
+        field=field,
+        frames=data.frames,
+        config=config,
+        report={
+            "iterations": iterations,
+            "resumed_at": first,
+            "device": str(device),
+            "points": [sum(len(c) for c in clouds) for clouds in data.shapes],
+            "observations": [len(clouds) for clouds in data.shapes],
+            "noise": [c.noise * f.scale for c, f in zip(chosen, data.frames, strict=True)],
+            "spacing": [c.spacing * f.scale for c, f in zip(chosen, data.frames, strict=True)],
+            "losses": {name: float(value) for name, value in trainer.callback_metrics.items()},
+            "seconds_prepare": round(prepared - start, 2),
+            "seconds_fit": round(time.perf_counter() - prepared, 2),
+        },
+    )
+
+
+def pick_device(name: str) -> torch.device:
+    """Turn auto | cpu | cuda | mps into a device that exists."""
+    if name == AUTO:
+        return torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    if name == "cuda" and not torch.cuda.is_available():
+        raise ConfigError("device 'cuda' asked for, but torch sees no CUDA device; use device=cpu, or see `n2n doctor`")
+    if name == "mps" and not torch.backends.mps.is_available():
+        raise ConfigError("device 'mps' asked for, but torch sees no Apple GPU; use device=cpu")
+    return torch.device(name)
+
+
+@contextmanager
+def quiet_lightning() -> Iterator[None]:
+    """Hide Lightning's remarks that a user of n2n cannot act on."""
+    loggers = [logging.getLogger(name) for name in ("lightning.pytorch", "lightning.fabric", "pytorch_lightning")]
+    levels = [logger.level for logger in loggers]
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", module="lightning.*")
+        warnings.filterwarnings("ignore", module="torch.utils.data.*")
+        warnings.filterwarnings("ignore", message=".*treespec.*|.*LeafSpec.*")
+        for logger in loggers:
+            logger.setLevel(logging.ERROR)
+        try:
+            yield
+        finally:
+            for logger, level in zip(loggers, levels, strict=True):
+                logger.setLevel(level)
+
+
+def _prepare(data: ObservationsDataModule, config: dict[str, Any]) -> tuple[list[Chosen], list[Guide]]:
+    """Measure every shape, and orient a scaffold of it where the recipe wants one."""
+    chosen, guides = [], []
+    for clouds in data.shapes:
+        arrays = [cloud.double().numpy() for cloud in clouds]
+        scales, pool = measure(arrays, config["seed"])
+        choice = choose(scales, arrays)
+        chosen.append(choice)
+        if config["scaffold"]:
+            guides.append(_guide(pool, scales, choice, config["seed"]))
+    return chosen, guides
+
+
+def _guide(pool: np.ndarray, scales: Any, choice: Chosen, seed: int) -> Guide:
+    scaffold = Scaffold.build(pool, scales, seed)
+    far, signs = scaffold.far_field(np.array(choice.lower), np.array(choice.upper), choice.margin, seed)
+    return Guide(*(torch.as_tensor(x, dtype=torch.float32) for x in (scaffold.points, scaffold.normals, far, signs)))
+
+
+def _fill_config(config: dict[str, Any], chosen: list[Chosen]) -> dict[str, Any]:
+    """Replace every `auto`; shapes that share one network share the finest choice."""
+    finest = min(chosen, key=lambda choice: choice.voxel)
+    box = {
+        "architecture.lower": [min(c.lower[a] for c in chosen) for a in range(3)],
+        "architecture.upper": [max(c.upper[a] for c in chosen) for a in range(3)],
+    }
+    return fill(config, {**finest.values(config), **box})
+
+
+def _to_device(guide: Guide, device: torch.device) -> Guide:
+    return Guide(guide.points.to(device), guide.normals.to(device), guide.far_points.to(device), guide.far_signs.to(device))
+
+
+def _resume_from(run_dir: Path | None) -> Path | None:
+    checkpoint = run_dir / LAST_CHECKPOINT if run_dir else None
+    return checkpoint if checkpoint and checkpoint.exists() else None
+
+
+def _iteration_of(checkpoint: Path) -> int:
+    return int(torch.load(checkpoint, weights_only=True, map_location="cpu")["global_step"])

@@ -1,0 +1,112 @@
+"""Eq. 7 as an object: draw queries and targets, match them, measure L + lambda R + further terms."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from n2n.datamodules.observations import Draw
+from n2n.geometry.pull import pull
+from n2n.geometry.sampling import QuerySampler
+from n2n.losses.state import FieldState, Guide
+
+_DENOISED_POINTS = 8192
+_FAR_POINTS = 2048
+
+
+@dataclass
+class Block:
+    """What stays fixed over the optimiser steps that share one matching."""
+
+    draw: Draw
+    queries: Tensor
+    targets: Tensor
+    plan: Any
+    denoised: Tensor
+    far: tuple[Tensor, Tensor] | None
+
+
+class Objective:
+    """The loss of a fit.
+
+    Args:
+        distance: L of Eq. 4, with `match` and call.
+        pairing: Which subsets are matched.
+        queries: Where the field is asked.
+        terms: name -> (weight, term); holds lambda R under `regulariser`.
+        guides: Per shape, or empty.
+    """
+
+    def __init__(
+        self,
+        distance: Any,
+        pairing: Any,
+        queries: QuerySampler,
+        terms: dict[str, tuple[float, Any]],
+        guides: list[Guide] | None = None,
+    ) -> None:
+        self.distance, self.pairing, self.queries = distance, pairing, queries
+        self.terms = {name: (weight, term) for name, (weight, term) in terms.items() if weight}
+        self.guides = guides or []
+
+    @torch.no_grad()
+    def begin(self, field: Any, draw: Draw, generator: torch.Generator) -> Block:
+        """Draw queries and targets and match them under the present field (Eq. 4)."""
+        candidates = self.queries(draw.source, generator, draw.key)
+        # Queries that are the targets themselves would be matched to where they already are.
+        tied = draw.same and self.queries.kind != "observation"
+        query_index, target_index = self.pairing(candidates, draw.target, generator, same=tied)
+        queries, targets = candidates[query_index], draw.target[target_index]
+        with field.shared():
+            moved = self._pull(field, queries.reshape(-1, 3), draw.condition).reshape(queries.shape)
+            plan = self.distance.match(moved, targets)
+            chosen = torch.randperm(len(draw.target), generator=generator)[:_DENOISED_POINTS].to(draw.target.device)
+            denoised = self._pull(field, draw.target[chosen], draw.condition)
+        return Block(draw, queries, targets, plan, denoised, self._far(draw, denoised, generator))
+
+    def loss(
+        self, field: Any, block: Block, progress: float, generator: torch.Generator
+    ) -> tuple[Tensor, dict[str, Tensor]]:
+        """Return the weighted sum and its parts (unweighted, detached) for the present parameters."""
+        condition = block.draw.condition
+        queries = block.queries.reshape(-1, 3)
+        codes = torch.full((len(queries),), condition, dtype=torch.long, device=queries.device)
+        value, gradient = field.value_and_gradient(queries, codes)
+        pulled = pull(queries, value, gradient)
+        matched = self.distance(pulled.reshape(block.queries.shape), block.targets, block.plan)
+        state = FieldState(
+            field=field,
+            queries=queries,
+            value=value,
+            gradient=gradient,
+            pulled=pulled,
+            targets=block.targets.reshape(-1, 3),
+            condition=condition,
+            denoised=block.denoised,
+            guide=self.guides[condition] if self.guides else None,
+            far=block.far,
+            progress=progress,
+            generator=generator,
+        )
+        total, parts = matched, {"distance": matched.detach()}
+        for name, (weight, term) in self.terms.items():
+            measured = term(state)
+            total = total + weight * measured
+            parts[name] = measured.detach()
+        return total, parts
+
+    def _pull(self, field: Any, points: Tensor, condition: int) -> Tensor:
+        codes = torch.full((len(points),), condition, dtype=torch.long, device=points.device)
+        return pull(points, *field.value_and_gradient(points, codes))
+
+    def _far(self, draw: Draw, denoised: Tensor, generator: torch.Generator) -> tuple[Tensor, Tensor] | None:
+        """Return some far points and their signed distance to the denoised set."""
+        if not self.guides:
+            return None
+        guide = self.guides[draw.condition]
+        if not len(guide.far_points):
+            return None
+        chosen = torch.randint(len(guide.far_points), (_FAR_POINTS,), generator=generator).to(denoised.device)
+        points = guide.far_points[chosen]
+        return points, guide.far_signs[chosen] * torch.cdist(points, denoised).amin(dim=1)
