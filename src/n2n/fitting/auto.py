@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from n2n.config import AUTO
 from n2n.geometry.scale import Scales, estimate_scales
 
-AUTO = "auto"
 
 _PROBED_POINTS = 20_000
 _NOISE_FLOOR = 0.05  # of the spacing: a clean cloud still has one length that limits what can be known
@@ -22,6 +22,8 @@ _STIFFNESS = 2.0
 _THIN_PLATE = 6.5e-3
 _BAND_VOXELS = 3.0
 _MAX_BATCH = 65_536
+_GRID_ITERATIONS, _GRID_RATE = 120, 0.02
+_NETWORK_ITERATIONS, _NETWORK_RATE = 2000, 5e-4
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,7 @@ class Chosen:
         band: Half width of the zone around the data where smoothness is asked for.
         margin: Distance beyond which the sign of the scaffold is trusted.
         batch_size: Points matched at once.
+        observations: N.
     """
 
     noise: float
@@ -48,14 +51,19 @@ class Chosen:
     band: float
     margin: float
     batch_size: int
+    observations: int
 
     def values(self, config: dict[str, Any]) -> dict[str, Any]:
         """Return the values of the configuration's `auto` fields by dotted name."""
         stiffness = (_STIFFNESS * self.noise) ** 2
         # The weights balance a squared distance; a distance of exponent 1 is larger by 1 / noise.
         unit = self.noise ** (config["distance"].get("p", 1) - 2)
+        linear = config["architecture"].get("name") == "grid"
         return {
+            "iterations": _GRID_ITERATIONS if linear else _NETWORK_ITERATIONS,
+            "optimizer.lr": _GRID_RATE if linear else _NETWORK_RATE,
             "batch_size": self.batch_size,
+            "queries.kind": "neighbour" if self.observations == 1 else "observation",
             "queries.scale": 0.5 * self.noise,
             "architecture.voxel": self.voxel,
             "terms.eikonal.weight": stiffness * unit,
@@ -103,6 +111,7 @@ def choose(scales: Scales, observations: list[NDArray[np.float64]]) -> Chosen:
         band=_BAND_VOXELS * voxel,
         margin=max(3 * noise, 2 * voxel),
         batch_size=min(max(map(len, observations)), _MAX_BATCH),
+        observations=len(observations),
     )
 
 

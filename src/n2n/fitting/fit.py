@@ -15,10 +15,11 @@ import torch
 from lightning.pytorch.callbacks import ModelCheckpoint
 
 from n2n.architectures.base import SDF
+from n2n.config import AUTO
 from n2n.datamodules.observations import ObservationsDataModule
 from n2n.errors import ConfigError
 from n2n.fitting.assemble import build_field, build_objective, build_optimizer
-from n2n.fitting.auto import AUTO, Chosen, choose, fill, measure
+from n2n.fitting.auto import Chosen, choose, fill, measure
 from n2n.fitting.callbacks import ProgressReport, Report
 from n2n.fitting.module import FitModule
 from n2n.geometry.frame import Frame

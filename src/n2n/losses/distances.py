@@ -105,7 +105,14 @@ class Sinkhorn(_SoftDistance):
 
 
 class Approximate(_SoftDistance):
-    """The released code's distance: soft multi-scale matching, cost |g - t|."""
+    """The released code's distance: soft multi-scale matching.
+
+    Args:
+        p: Exponent of the cost; the released code uses 1.
+    """
+
+    def __init__(self, p: int = 1) -> None:
+        self.p = p
 
     def match(self, moved: Leaves, target: Leaves) -> Coupling:
         return approximate_plan(moved.detach(), target)

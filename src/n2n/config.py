@@ -1,0 +1,97 @@
+"""The typed configuration: every key of conf/ with its range; no Hydra, no torch."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from n2n.errors import ConfigError
+
+AUTO = "auto"
+DEVICES = ("auto", "cpu", "cuda", "mps")
+TASKS = ("reconstruct", "denoise", "upsample")
+PAIRS = ("random", "same")
+
+
+@dataclass
+class QueriesConfig:
+    """Where the field is asked; see `n2n.geometry.sampling.QuerySampler`."""
+
+    kind: str = "observation"
+    neighbour: int = 50
+    scale: Any = 1.0
+
+    def __post_init__(self) -> None:
+        _one_of("queries.kind", self.kind, ("auto", "observation", "neighbour", "jitter"))
+        _at_least("queries.neighbour", self.neighbour, 1)
+        _at_least("queries.scale", self.scale, 0)
+
+
+@dataclass
+class Config:
+    """One fit. Component entries are mappings of `name` and that component's arguments.
+
+    Attributes:
+        seed: Seed of everything random.
+        device: auto | cpu | cuda | mps.
+        task: What the field is for; the paper chooses lambda and B by it.
+        iterations: Optimiser steps; auto = what the architecture needs.
+        batch_size: B, points matched at once; auto = all points of an observation.
+        num_observations: N, observations used per shape; null = all.
+        regulariser_weight: lambda of Eq. 7.
+        plan_reuse: Optimiser steps per matching.
+        pairs: Observations of a pair: random (i, j) or same (i = j).
+        scaffold: Build an oriented local fit before the fit (needed by the terms scaffold, far_field, smoothness).
+        checkpoint_every: Iterations between checkpoints.
+        terms: Further weighted terms of the loss: name -> {weight, arguments}.
+    """
+
+    seed: int = 0
+    device: str = "auto"
+    task: str = "reconstruct"
+    iterations: Any = AUTO
+    batch_size: Any = AUTO
+    num_observations: int | None = None
+    regulariser_weight: float = 0.0
+    plan_reuse: int = 1
+    pairs: str = "random"
+    scaffold: bool = False
+    checkpoint_every: int = 1000
+    queries: QueriesConfig = field(default_factory=QueriesConfig)
+    architecture: dict[str, Any] = field(default_factory=dict)
+    distance: dict[str, Any] = field(default_factory=dict)
+    pairing: dict[str, Any] = field(default_factory=dict)
+    regulariser: dict[str, Any] = field(default_factory=dict)
+    terms: dict[str, Any] = field(default_factory=dict)
+    optimizer: dict[str, Any] = field(default_factory=dict)
+    scheduler: dict[str, Any] = field(default_factory=dict)
+    datamodule: dict[str, Any] = field(default_factory=dict)
+    logger: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        _one_of("device", self.device, DEVICES)
+        _one_of("task", self.task, TASKS)
+        _one_of("pairs", self.pairs, PAIRS)
+        _at_least("seed", self.seed, 0)
+        _at_least("iterations", self.iterations, 1)
+        _at_least("batch_size", self.batch_size, 1)
+        _at_least("plan_reuse", self.plan_reuse, 1)
+        _at_least("checkpoint_every", self.checkpoint_every, 1)
+        _at_least("regulariser_weight", self.regulariser_weight, 0)
+        if self.num_observations is not None:
+            _at_least("num_observations", self.num_observations, 1)
+        for name, spec in self.terms.items():
+            if spec is not None:
+                _at_least(f"terms.{name}.weight", spec.get("weight", 1.0), 0)
+
+
+def _one_of(key: str, value: Any, known: tuple[str, ...]) -> None:
+    if value not in known:
+        raise ConfigError(f"{key}={value} is not known; choose one of: {', '.join(known)}")
+
+
+def _at_least(key: str, value: Any, lowest: float) -> None:
+    if value == AUTO:
+        return
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ConfigError(f"{key}={value} is not a number; give a number >= {lowest}")
+    if not value >= lowest:
+        raise ConfigError(f"{key}={value} is out of range; give a number >= {lowest}")

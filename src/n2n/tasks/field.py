@@ -1,0 +1,124 @@
+"""A fitted field in world coordinates: surface, denoised points, upsampled points."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+import trimesh
+from numpy.typing import NDArray
+
+from n2n.architectures.base import SDF
+from n2n.errors import InputError
+from n2n.fitting.assemble import build_field
+from n2n.fitting.fit import FitResult, pick_device
+from n2n.geometry.frame import Frame
+from n2n.tasks.points import denoise_points, upsample_points
+from n2n.tasks.surface import reconstruct_surface
+
+FIELD_FILE = "field.ckpt"
+
+
+@dataclass
+class Field:
+    """A signed distance field of one shape, or of several told apart by `shape`.
+
+    All positions are world coordinates, float64. Inside is negative.
+
+    Attributes:
+        sdf: The network or grid, unit coordinates.
+        frames: World <-> unit map per shape.
+        config: Configuration of the fit, every `auto` filled in.
+        report: Measured scales, iterations, seconds, final losses.
+    """
+
+    sdf: SDF
+    frames: list[Frame]
+    config: dict[str, Any]
+    report: dict[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, result: FitResult) -> "Field":
+        """Wrap the result of a fit."""
+        return cls(result.field, result.frames, result.config, result.report)
+
+    def reconstruct(
+        self, resolution: int = 256, edge: float | None = None, shape: int = 0, keep_all: bool = False
+    ) -> trimesh.Trimesh:
+        """Extract the zero level set as a mesh with outward normals.
+
+        Args:
+            resolution: Voxels along the longest side of the surface's box.
+            edge: Voxel edge in world units; overrides `resolution`.
+            shape: Which shape of a field that holds several.
+            keep_all: Also return specks: components smaller than 1 % of the largest.
+
+        Raises:
+            SurfaceError: The field has no zero level set; the message says why.
+        """
+        return reconstruct_surface(self.sdf, self.frames[shape], self.config, resolution, edge, shape, keep_all)
+
+    def denoise(self, points: NDArray[np.float64], shape: int = 0) -> NDArray[np.float64]:
+        """Pull (n, 3) noisy points onto the surface; number and order are kept."""
+        return denoise_points(self.sdf, self.frames[shape], _points(points), shape)
+
+    def upsample(self, points: NDArray[np.float64], rate: int = 4, seed: int = 0, shape: int = 0) -> NDArray[np.float64]:
+        """Return (rate * n, 3) points on the surface: the n denoised points, then rate - 1 perturbed copies, pulled."""
+        return upsample_points(self.sdf, self.frames[shape], _points(points), rate, seed, shape)
+
+    def sdf_at(self, points: NDArray[np.float64], shape: int = 0) -> NDArray[np.float64]:
+        """Return signed distances (n,) in world units at (n, 3) positions, inside negative."""
+        frame = self.frames[shape]
+        with torch.no_grad():
+            unit = torch.as_tensor(frame.to_unit(_points(points)), dtype=torch.float32, device=self.device)
+            codes = torch.full((len(unit),), shape, dtype=torch.long, device=self.device)
+            return self.sdf(unit, codes).double().cpu().numpy() * frame.scale
+
+    @property
+    def device(self) -> torch.device:
+        """Where the field computes."""
+        return next(self.sdf.parameters()).device
+
+    def save(self, run_dir: str | Path) -> Path:
+        """Write the field into a run folder as plain numbers and tensors; return the file."""
+        path = Path(run_dir) / FIELD_FILE
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary = path.with_suffix(".tmp")
+        torch.save(
+            {
+                "config": self.config,
+                "frames": [frame.state() for frame in self.frames],
+                "report": self.report,
+                "weights": self.sdf.state_dict(),
+            },
+            temporary,
+        )
+        temporary.replace(path)
+        return path
+
+    @classmethod
+    def load(cls, run_dir: str | Path, device: str = "auto") -> "Field":
+        """Read a field from a run folder.
+
+        Raises:
+            InputError: There is no finished run.
+        """
+        path = Path(run_dir) / FIELD_FILE
+        if not path.exists():
+            raise InputError(f"{run_dir} holds no finished run ({FIELD_FILE} is missing); make one with `n2n fit`")
+        try:
+            state = torch.load(path, map_location="cpu", weights_only=True)
+            frames = [Frame(tuple(frame["centre"]), frame["scale"]) for frame in state["frames"]]
+            sdf = build_field(state["config"], len(frames))
+            sdf.load_state_dict(state["weights"])
+        except (RuntimeError, KeyError, EOFError, ValueError, TypeError) as error:
+            raise InputError(f"{path} cannot be read as an n2n field ({str(error).splitlines()[0]}); fit again") from error
+        return cls(sdf.eval().to(pick_device(device)), frames, state["config"], state["report"])
+
+
+def _points(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    points = np.asarray(points, np.float64)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise InputError(f"points must be an array of shape (n, 3), got {points.shape}")
+    return points
