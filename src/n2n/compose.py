@@ -3,16 +3,20 @@
 import hashlib
 import json
 import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
-from n2n.config import Config
+from n2n.config import OPEN_KEYS, Config
 from n2n.errors import ConfigError
-from n2n.registry import suggest
+from n2n.gates import check_components
+from n2n.messages import explain, unknown_key
 
 CONF_PLUGINS = "n2n.conf"
+_OPEN = re.compile(rf"(?:{'|'.join(OPEN_KEYS)})\.[\w.]+=")
 
 
 def conf_dir() -> Path:
@@ -26,7 +30,7 @@ def conf_dir() -> Path:
 
 def plugin_search_paths() -> list[str]:
     """Return `pkg://...` search paths of third-party YAML options (entry point group `n2n.conf`)."""
-    return [f"pkg://{point.value}" for point in entry_points(group=CONF_PLUGINS)]
+    return sorted(f"pkg://{point.value}" for point in entry_points(group=CONF_PLUGINS))
 
 
 def register_schema() -> None:
@@ -36,72 +40,73 @@ def register_schema() -> None:
     ConfigStore.instance().store(name="n2n_schema", node=Config)
 
 
-def compose(overrides: list[str]) -> dict[str, Any]:
+def hydra_arguments(overrides: Sequence[str]) -> list[str]:
+    """Return overrides as Hydra wants them: plugins' options found, component arguments open.
+
+    Hydra would refuse `terms.on_surface.weight=1` because no YAML file mentions that key. Components know their own
+    arguments, and `check_components` asks them; so such keys are passed as `++key=value` (add or change).
+    """
+    opened = [f"++{text}" if _OPEN.match(text) else text for text in overrides]
+    search = plugin_search_paths()
+    return [*opened, *([f"hydra.searchpath=[{','.join(search)}]"] if search else [])]
+
+
+def compose(overrides: Sequence[str] = ()) -> dict[str, Any]:
     """Compose conf/config.yaml with overrides such as `recipe=paper` or `iterations=500`.
 
     Returns:
-        Plain nested dict, types and ranges checked.
+        Plain nested dict; types, ranges and component arguments checked.
 
     Raises:
         ConfigError: Unknown key or option (with the nearest known one), wrong type or range.
     """
     from hydra import compose as hydra_compose
     from hydra import initialize_config_dir
-    from hydra.core.global_hydra import GlobalHydra
 
     register_schema()
-    GlobalHydra.instance().clear()
-    search = ",".join(plugin_search_paths())
-    extra = [f"hydra.searchpath=[{search}]"] if search else []
-    try:
-        with initialize_config_dir(str(conf_dir()), version_base="1.3", job_name="n2n"):
-            composed = hydra_compose("config", overrides=[*overrides, *extra])
-    except Exception as error:
-        raise ConfigError(explain(error)) from error
+    with _own_hydra():
+        try:
+            with initialize_config_dir(str(conf_dir()), version_base="1.3", job_name="n2n"):
+                composed = hydra_compose("config", overrides=hydra_arguments(overrides))
+        except Exception as error:
+            raise ConfigError(explain(error)) from error
     return validate(composed)
 
 
 def validate(composed: Any) -> dict[str, Any]:
-    """Check a composed DictConfig against the schema's types and ranges and return a plain dict."""
+    """Pass a composed DictConfig through the three gates and return a plain dict.
+
+    Types are checked by the schema, ranges by `Config`, component arguments by the components' signatures.
+    """
     from omegaconf import OmegaConf
     from omegaconf.errors import OmegaConfBaseException
 
+    for key in composed:
+        if key not in Config.__dataclass_fields__:
+            raise ConfigError(unknown_key(key))
     try:
         typed = OmegaConf.to_object(composed)
     except OmegaConfBaseException as error:
         raise ConfigError(explain(error)) from error
-    return asdict(typed)
-
-
-def explain(error: Exception) -> str:
-    """Reduce a Hydra or OmegaConf error to one line that says what to change."""
-    cause = error
-    while cause.__cause__ is not None and not isinstance(cause, ConfigError):
-        cause = cause.__cause__
-    if isinstance(cause, ConfigError):
-        return str(cause)
-    text = " ".join(str(error).split())
-    missing = re.search(r"Could not find '([\w/]+)/([^'/]+)'", text)
-    if missing:
-        group, option = missing.groups()
-        known = sorted(path.stem for path in (conf_dir() / group).glob("*.yaml"))
-        return f"Unknown {group} {option!r}.{suggest(option, known)}"
-    key = re.search(r"(?:Could not override|Key) '([\w.]+)'", text)
-    if key:
-        name = key.group(1)
-        known = _known_keys(name)
-        return f"Unknown configuration key {name!r}.{suggest(name.rpartition('.')[2], known)}"
-    return text
-
-
-def _known_keys(name: str) -> list[str]:
-    """Return the keys beside a dotted name in the default configuration."""
-    node: Any = asdict(Config())
-    for part in name.split(".")[:-1]:
-        node = node.get(part, {}) if isinstance(node, dict) else {}
-    return list(node) if isinstance(node, dict) else []
+    config = asdict(typed)
+    check_components(config)
+    return config
 
 
 def config_hash(config: dict[str, Any]) -> str:
     """Return 10 hex digits that name a configuration by content."""
     return hashlib.sha256(json.dumps(config, sort_keys=True, default=str).encode()).hexdigest()[:10]
+
+
+@contextmanager
+def _own_hydra() -> Iterator[None]:
+    """Give Hydra's global state back afterwards: the caller may be a Hydra application itself."""
+    from hydra.core.global_hydra import GlobalHydra
+
+    instance = GlobalHydra.instance()
+    theirs = instance.hydra
+    instance.clear()
+    try:
+        yield
+    finally:
+        instance.hydra = theirs

@@ -9,6 +9,13 @@ AUTO = "auto"
 DEVICES = ("auto", "cpu", "cuda", "mps")
 TASKS = ("reconstruct", "denoise", "upsample")
 PAIRS = ("random", "same")
+# Keys whose entries are a component's own arguments: checked against its signature, not against this schema.
+OPEN_KEYS = (
+    "architecture", "distance", "pairing", "regulariser", "terms", "optimizer", "scheduler", "datamodule", "logger",
+)  # fmt: skip
+
+# Whole numbers and the lowest value of each; `auto` and null are kept.
+_WHOLE = {"seed": 0, "iterations": 1, "batch_size": 1, "plan_reuse": 1, "checkpoint_every": 1, "num_observations": 1}
 
 
 @dataclass
@@ -21,7 +28,7 @@ class QueriesConfig:
 
     def __post_init__(self) -> None:
         _one_of("queries.kind", self.kind, ("auto", "observation", "neighbour", "jitter"))
-        _at_least("queries.neighbour", self.neighbour, 1)
+        self.neighbour = _whole("queries.neighbour", self.neighbour, 1)
         _at_least("queries.scale", self.scale, 0)
 
 
@@ -70,16 +77,13 @@ class Config:
         _one_of("device", self.device, DEVICES)
         _one_of("task", self.task, TASKS)
         _one_of("pairs", self.pairs, PAIRS)
-        _at_least("seed", self.seed, 0)
-        _at_least("iterations", self.iterations, 1)
-        _at_least("batch_size", self.batch_size, 1)
-        _at_least("plan_reuse", self.plan_reuse, 1)
-        _at_least("checkpoint_every", self.checkpoint_every, 1)
         _at_least("regulariser_weight", self.regulariser_weight, 0)
-        if self.num_observations is not None:
-            _at_least("num_observations", self.num_observations, 1)
+        for key, lowest in _WHOLE.items():
+            setattr(self, key, _whole(key, getattr(self, key), lowest))
         for name, spec in self.terms.items():
             if spec is not None:
+                if not isinstance(spec, dict):
+                    raise ConfigError(f"terms.{name}={spec} is not a term; give its weight as terms.{name}.weight=...")
                 _at_least(f"terms.{name}.weight", spec.get("weight", 1.0), 0)
 
 
@@ -88,10 +92,20 @@ def _one_of(key: str, value: Any, known: tuple[str, ...]) -> None:
         raise ConfigError(f"{key}={value} is not known; choose one of: {', '.join(known)}")
 
 
+def _whole(key: str, value: Any, lowest: int) -> Any:
+    """Return a whole number; 1e5 is one, although YAML reads it as a float."""
+    if value is None or value == AUTO:
+        return value
+    _at_least(key, value, lowest)
+    if value != value // 1:
+        raise ConfigError(f"{key}={value} is not a whole number; give one >= {lowest}")
+    return int(value)
+
+
 def _at_least(key: str, value: Any, lowest: float) -> None:
     if value == AUTO:
         return
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ConfigError(f"{key}={value} is not a number; give a number >= {lowest}")
-    if not value >= lowest:
+    if not lowest <= value < float("inf"):
         raise ConfigError(f"{key}={value} is out of range; give a number >= {lowest}")

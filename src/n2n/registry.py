@@ -39,14 +39,14 @@ class Registry:
 
     def describe(self, name: str) -> str:
         """Return one line about a component; imports only what third parties registered."""
-        if name in self._builtins:
+        if name in self._builtins and name not in self._registered:
             return self._builtins[name].summary
         try:
             component = self.get(name)
         except ConfigError as error:
             return f"broken: {error}"
         document = (inspect.getdoc(component) or "no description").splitlines()[0]
-        plugin = self._plugins().get(name)
+        plugin = None if name in self._registered else self._plugins().get(name)
         return f"{document} [{plugin.dist.name}]" if plugin and plugin.dist else document
 
     def get(self, name: str) -> Callable[..., Any]:
@@ -81,6 +81,21 @@ class Registry:
         Raises:
             ConfigError: Unknown name, unknown argument or missing argument, found before anything is constructed.
         """
+        component, arguments = self._bind(spec, extra)
+        return component(**arguments)
+
+    def check(self, spec: str | Mapping[str, Any], *given: str) -> None:
+        """Raise what `build` would raise about names and arguments, without constructing anything.
+
+        Args:
+            spec: As for `build`.
+            given: Names of the arguments the caller will provide as `extra`.
+        """
+        self._bind(spec, dict.fromkeys(given))
+
+    def _bind(
+        self, spec: str | Mapping[str, Any], extra: Mapping[str, Any]
+    ) -> tuple[Callable[..., Any], dict[str, Any]]:
         arguments = {"name": spec} if isinstance(spec, str) else dict(spec)
         name = arguments.pop("name", None)
         if not isinstance(name, str):
@@ -88,23 +103,20 @@ class Registry:
         component = self.get(name)
         parameters = inspect.signature(component).parameters
         open_ended = any(p.kind is p.VAR_KEYWORD for p in parameters.values())
+        known = [p.name for p in parameters.values() if p.kind not in (p.VAR_KEYWORD, p.VAR_POSITIONAL)]
         for argument in arguments:
-            if argument not in parameters and not open_ended:
-                known = [p for p in parameters if p not in ("args", "kwargs")]
-                raise ConfigError(
-                    f"{self.kind} {name!r} has no argument {argument!r}.{suggest(argument, known) or ' It takes none.'}"
-                )
+            if argument not in known and not open_ended:
+                expected = suggest(argument, [k for k in known if k not in extra])
+                raise ConfigError(f"{self.kind} {name!r} has no argument {argument!r}.{expected or ' It takes none.'}")
         for argument, value in extra.items():
-            if argument in parameters or open_ended:
+            if argument in known or open_ended:
                 arguments.setdefault(argument, value)
-        missing = [
-            p.name
-            for p in parameters.values()
-            if p.default is p.empty and p.kind not in (p.VAR_KEYWORD, p.VAR_POSITIONAL) and p.name not in arguments
-        ]
+        missing = [k for k in known if parameters[k].default is inspect.Parameter.empty and k not in arguments]
         if missing:
-            raise ConfigError(f"{self.kind} {name!r} needs {', '.join(missing)}; give it as {self.kind}.{missing[0]}=...")
-        return component(**arguments)
+            raise ConfigError(
+                f"{self.kind} {name!r} needs {', '.join(missing)}; give it as {self.kind}.{missing[0]}=..."
+            )
+        return component, arguments
 
     def register(self, name: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
         """Return a decorator that adds a class under `name` for this process."""
