@@ -9,7 +9,7 @@ and largest for consistent signs: neighbours on a sheet attract equal signs, opp
 ones. No neighbour graph can leak, every pair counts.
 
 Source: the quadratic form is the screened-Poisson energy of Kazhdan and Hoppe 2013 without the screening; Metzer et al. 2021
-    propagate the same dipole field greedily. Differs: the energy itself is maximised, by sign iteration and cluster flips.
+    propagate the same dipole field greedily. Differs: the energy itself is maximised, by chains of flips.
 """
 
 import numpy as np
@@ -20,8 +20,7 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components, mini
 from scipy.spatial import cKDTree
 from torch import Tensor
 
-_ROUNDS = 60
-_MAX_CLUSTERS = 600
+_PATIENCE = 20
 _GRAPH_NEIGHBOURS = 10
 
 
@@ -43,12 +42,8 @@ def orient(
     energy = dipole_energy(points, normals, areas)
     graph = _neighbour_graph(points, normals)
     starts = [_spanning_tree_signs(graph, normals), _leading_eigenvector_signs(energy, generator)]
-    best, best_energy = None, -np.inf
-    for signs in starts:
-        signs = _search(energy, signs, points, normals, graph, generator)
-        value = float(signs @ (energy @ signs))
-        if value > best_energy:
-            best, best_energy = signs, value
+    found = [_search(energy, signs, generator) for signs in starts]
+    best = max(found, key=lambda signs: float(signs @ (energy @ signs)))
     return _point_outwards(points, normals * best.numpy()[:, None], areas, graph)
 
 
@@ -110,84 +105,48 @@ def _iterate_signs(energy: Tensor, signs: Tensor) -> Tensor:
     return signs
 
 
-def _search(
-    energy: Tensor,
-    signs: Tensor,
-    points: NDArray[np.float64],
-    normals: NDArray[np.float64],
-    graph: sparse.csr_matrix,
-    generator: np.random.Generator,
-) -> Tensor:
-    """Flip whole clusters while that raises the energy: what sign by sign is a barrier is one step for a cluster."""
-    signs = _iterate_signs(energy, signs)
-    value = float(signs @ (energy @ signs))
-    for turn in range(_ROUNDS):
-        oriented = normals * signs.numpy()[:, None]
-        labels = (
-            _clusters_by_position(points, oriented, generator)
-            if turn % 2 == 0
-            else _clusters_by_agreement(oriented, graph, generator)
-        )
-        count = int(labels.max()) + 1
-        member = torch.zeros(len(signs), count)
-        member[torch.arange(len(signs)), torch.as_tensor(labels)] = signs
-        coupling = (member.T @ (energy @ member)).numpy().astype(np.float64)
-        np.fill_diagonal(coupling, 0)
-        flips = _anneal(coupling, generator)
-        if (flips > 0).all():
-            continue
-        proposal = _iterate_signs(energy, signs * torch.as_tensor(flips[labels], dtype=torch.float32))
-        proposed = float(proposal @ (energy @ proposal))
-        if proposed > value:
-            signs, value = proposal, proposed
-    return signs
+def _search(energy: Tensor, signs: Tensor, generator: np.random.Generator) -> Tensor:
+    """Flip regions, grown point by point from unstable seeds, while that raises the energy."""
+    coupling = energy.numpy()
+    current = _iterate_signs(energy, signs).numpy()
+    failures = 0
+    while failures < _PATIENCE:
+        field = coupling @ current
+        stability = np.maximum(current * field, 0)
+        odds = 1 / (stability + 0.05 * np.median(stability) + 1e-30)
+        seed = int(generator.choice(len(current), p=odds / odds.sum()))
+        region = _grow_region(coupling, current, field, seed)
+        failures = 0 if len(region) else failures + 1
+        current[region] *= -1
+    return torch.as_tensor(current)
 
 
-def _clusters_by_position(
-    points: NDArray[np.float64], oriented: NDArray[np.float64], generator: np.random.Generator
-) -> NDArray[np.int64]:
-    """Cells of random seeds in position and normal, 4 to 256 of them, so that the sides of a wall fall apart."""
-    count = min(int(2 ** generator.uniform(2, 8)), len(points))
-    size = 0.5 * np.linalg.norm(np.ptp(points, axis=0)) / np.sqrt(count)
-    feature = np.concatenate([points, generator.choice([0.3, 1.0]) * size * oriented], axis=1)
-    seeds = feature[generator.choice(len(points), count, replace=False)]
-    return cKDTree(seeds).query(feature)[1]
+def _grow_region(
+    coupling: NDArray[np.float32], signs: NDArray[np.float32], field: NDArray[np.float32], seed: int
+) -> list[int]:
+    """Flip the seed, then always the point that gains most, through losses too; return the prefix that gained most.
 
+    A wrongly oriented bore or wall is a region whose border costs energy however it moves, until it closes: single
+    flips and clusters get stuck there, a chain of flips walks over the barrier.
 
-def _clusters_by_agreement(
-    oriented: NDArray[np.float64], graph: sparse.csr_matrix, generator: np.random.Generator
-) -> NDArray[np.int64]:
-    """Connected parts of the graph whose edges agree: their borders run along the present contradictions."""
-    edges = graph.tocoo()
-    agree = (oriented[edges.row] * oriented[edges.col]).sum(axis=1) > generator.uniform(0.2, 0.97)
-    kept = sparse.csr_matrix((np.ones(agree.sum()), (edges.row[agree], edges.col[agree])), shape=graph.shape)
-    _, labels = connected_components(kept, directed=False)
-    rank = np.argsort(np.argsort(-np.bincount(labels), kind="stable"), kind="stable")
-    return np.minimum(rank[labels], _MAX_CLUSTERS)
-
-
-def _anneal(coupling: NDArray[np.float64], generator: np.random.Generator) -> NDArray[np.float64]:
-    """Maximise x^T J x over signs x: simulated annealing, then the best single flips; all ones if nothing is better."""
-    count = len(coupling)
-    flips = np.ones(count)
-    field = coupling @ flips
-    start = flips @ field
-    heat = 0.5 * np.abs(coupling).sum(axis=1).mean()
-    steps = 30 * count if count <= 512 else 0
-    for step in range(steps):
-        i = generator.integers(count)
-        gain = -flips[i] * field[i]
-        if gain > 0 or generator.random() < np.exp(gain / (heat * (1 - step / steps) ** 2 + 1e-300)):
-            flips[i] = -flips[i]
-            field += 2 * coupling[:, i] * flips[i]
-    for _ in range(6 * count):
-        gain = -flips * field
-        i = gain.argmax()
-        if gain[i] <= 1e-12 * abs(start):
-            break
-        flips[i] = -flips[i]
-        field += 2 * coupling[:, i] * flips[i]
-    return flips if flips @ (coupling @ flips) > start else np.ones(count)
+    Source: Fiduccia and Mattheyses 1982, the same move for graph partitioning.
+    """
+    signs, field = signs.copy(), field.copy()
+    locked = np.zeros(len(signs), np.float32)
+    order: list[int] = []
+    gained = best = 0.0
+    length = 0
+    point = seed
+    for _ in range(len(signs) // 2):
+        gained -= 4 * float(signs[point] * field[point])
+        signs[point] = -signs[point]
+        field += 2 * signs[point] * coupling[point]
+        locked[point] = np.inf
+        order.append(point)
+        if gained > best + 1e-6 * abs(best) + 1e-9:
+            best, length = gained, len(order)
+        point = int((-signs * field - locked).argmax())
+    return order[:length]
 
 
 def _point_outwards(

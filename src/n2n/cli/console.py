@@ -1,0 +1,33 @@
+"""What a person sees while a command works: one progress bar, then a summary."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from n2n.fitting.callbacks import Report
+
+_console = Console(stderr=True, highlight=False)
+
+
+def say(text: str, quiet: bool = False) -> None:
+    """Print a line on standard error, where it does not mix with data."""
+    if not quiet:
+        _console.print(text, markup=False, soft_wrap=True)
+
+
+@contextmanager
+def progress_bar(label: str, quiet: bool = False) -> Iterator[Report | None]:
+    """Yield a function for `fit(report=...)` that moves one bar; None when quiet."""
+    if quiet:
+        yield None
+        return
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:>3.0f}%"), TimeElapsedColumn())
+    with Progress(*columns, console=_console, transient=True) as progress:
+        task = progress.add_task(label, total=None)
+
+        def report(done: int, total: int, values: dict[str, float]) -> None:
+            progress.update(task, completed=done, total=total)
+
+        yield report

@@ -1,0 +1,92 @@
+"""Analytic shapes with a known signed distance, and simulated noisy scans of them."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+_Distance = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+
+def _box(p: NDArray[np.float64], centre: tuple, half: tuple) -> NDArray[np.float64]:
+    q = np.abs(p - centre) - half
+    return np.linalg.norm(np.maximum(q, 0), axis=1) + np.minimum(q.max(axis=1), 0)
+
+
+def _cylinder(p: NDArray[np.float64], centre: tuple, axis: int, radius: float, half: float) -> NDArray[np.float64]:
+    q = p - centre
+    radial = np.linalg.norm(np.delete(q, axis, axis=1), axis=1) - radius
+    q = np.stack([radial, np.abs(q[:, axis]) - half], axis=1)
+    return np.linalg.norm(np.maximum(q, 0), axis=1) + np.minimum(q.max(axis=1), 0)
+
+
+def bracket(p: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A mounting bracket, millimetres: base plate, thin upright wall with a hole, gusset, boss with a bore.
+
+    The value has the right sign everywhere and is the exact distance near faces; next to inner edges of the union it is
+    a lower bound.
+    """
+    base = _box(p, (0, 0, 5), (60, 35, 5))
+    wall = _box(p, (-56, 0, 40), (4, 35, 40))
+    gusset = np.maximum(_box(p, (-32, 0, 30), (28, 3, 28)), ((p[:, 0] + 10) + (p[:, 2] - 28)) / np.sqrt(2))
+    boss = _cylinder(p, (28, 0, 17), 2, 18, 17)
+    solid = np.minimum.reduce([base, wall, gusset, boss])
+    bore = _cylinder(p, (28, 0, 17), 2, 10, 40)
+    window = _cylinder(p, (-56, 0, 55), 0, 14, 20)
+    return np.maximum(solid, -np.minimum(bore, window))
+
+
+def sphere(p: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The unit sphere."""
+    return np.linalg.norm(p, axis=1) - 1
+
+
+def torus(p: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A torus around z, radii 0.7 and 0.25."""
+    return np.hypot(np.hypot(p[:, 0], p[:, 1]) - 0.7, p[:, 2]) - 0.25
+
+
+# Shape -> signed distance, lower and upper corner of a box around it.
+SHAPES: dict[str, tuple[_Distance, tuple, tuple]] = {
+    "bracket": (bracket, (-65, -40, -5), (65, 40, 85)),
+    "sphere": (sphere, (-1.1, -1.1, -1.1), (1.1, 1.1, 1.1)),
+    "torus": (torus, (-1, -1, -0.3), (1, 1, 0.3)),
+}
+
+
+def sample_surface(shape: str, count: int, seed: int = 0) -> NDArray[np.float64]:
+    """Return `count` points on the surface, evenly by area.
+
+    Points of a thin shell around the surface are even by area; they are then moved onto the surface along the gradient.
+    """
+    distance, lower, upper = SHAPES[shape]
+    random = np.random.default_rng(seed)
+    shell = 0.004 * float(np.linalg.norm(np.subtract(upper, lower)))
+    chosen: list[NDArray[np.float64]] = []
+    while sum(map(len, chosen)) < count:
+        candidates = random.uniform(lower, upper, (200_000, 3))
+        chosen.append(candidates[np.abs(distance(candidates)) < shell])
+    points = np.concatenate(chosen)[:count]
+    for _ in range(6):
+        points = points - distance(points)[:, None] * _gradient(distance, points, shell)
+    return points
+
+
+def scan(shape: str, count: int, noise: float, seed: int = 0) -> NDArray[np.float64]:
+    """Return a simulated scan: even surface points plus isotropic Gaussian noise.
+
+    Args:
+        shape: A name of `SHAPES`.
+        count: Points.
+        noise: Standard deviation relative to the bounding radius.
+        seed: Of points and noise.
+    """
+    points = sample_surface(shape, count, seed)
+    radius = np.linalg.norm(points - (points.min(axis=0) + points.max(axis=0)) / 2, axis=1).max()
+    return points + noise * radius * np.random.default_rng([seed, 1]).standard_normal(points.shape)
+
+
+def _gradient(distance: _Distance, points: NDArray[np.float64], shell: float) -> NDArray[np.float64]:
+    step = 1e-3 * shell
+    slope = np.stack([distance(points + step * e) - distance(points - step * e) for e in np.eye(3)], axis=1) / (2 * step)
+    return slope / np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-12)

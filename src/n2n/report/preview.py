@@ -1,0 +1,82 @@
+"""Before and after in one picture: noisy cloud, denoised cloud, mesh, from the same side."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from n2n.formats.atomic import atomic_path
+from n2n.report.raster import Camera, Canvas
+
+if TYPE_CHECKING:
+    import trimesh
+
+_NOISY = np.array([0.80, 0.36, 0.22])
+_CLEAN = np.array([0.16, 0.42, 0.66])
+_SURFACE = np.array([0.66, 0.74, 0.82])
+_SIZE = 720
+_MAX_POINTS = 200_000
+
+
+def draw_preview(
+    path: Path,
+    before: NDArray[np.float64] | None,
+    after: NDArray[np.float64] | None,
+    mesh: "trimesh.Trimesh | None",
+    captions: tuple[str, str, str] | None = None,
+    size: int = _SIZE,
+) -> None:
+    """Write a PNG with one panel for each thing given.
+
+    Args:
+        path: Output file.
+        before: (n, 3) noisy points, or None.
+        after: (m, 3) points on the surface, or None.
+        mesh: The surface, or None.
+        captions: For before, after and mesh; None counts what is shown.
+        size: Pixels of a panel's side.
+    """
+    vertices = np.asarray(mesh.vertices) if mesh is not None else None
+    everything = next(x for x in (after, vertices, before) if x is not None)
+    camera = Camera.around(everything, up=_up_axis(everything))
+    labels = captions or (
+        f"noisy: {0 if before is None else len(before):,} points",
+        f"denoised: {0 if after is None else len(after):,} points",
+        f"surface: {0 if mesh is None else len(mesh.faces):,} triangles",
+    )
+    panels = []
+    for points, colour, label in ((before, _NOISY, labels[0]), (after, _CLEAN, labels[1])):
+        if points is not None:
+            canvas = Canvas(size, camera)
+            shown = points[:: -(-len(points) // _MAX_POINTS)]
+            canvas.points(shown, colour, radius=float(np.clip(180 / np.sqrt(len(shown)), 0.6, 2.4)))
+            panels.append((canvas.image(), label))
+    if mesh is not None:
+        canvas = Canvas(size, camera)
+        canvas.mesh(vertices, np.asarray(mesh.faces), _SURFACE)
+        panels.append((canvas.image(), labels[2]))
+    _save(path, panels)
+
+
+def _up_axis(points: NDArray[np.float64]) -> int:
+    """Scans stand on z more often than not; flat ones lie on their thinnest axis."""
+    extent = np.ptp(points, axis=0)
+    thinnest = int(extent.argmin())
+    return thinnest if extent[thinnest] < 0.5 * np.sort(extent)[1] else 2
+
+
+def _save(path: Path, panels: list[tuple[NDArray[np.uint8], str]]) -> None:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    size = panels[0][0].shape[0]
+    figure = Figure(figsize=(size * len(panels) / 100, size * 1.07 / 100), dpi=100, facecolor="white")
+    FigureCanvasAgg(figure)
+    for index, (image, label) in enumerate(panels):
+        axes = figure.add_axes((index / len(panels), 0.0, 1 / len(panels), 1 / 1.07))
+        axes.imshow(image, interpolation="none")
+        axes.axis("off")
+        figure.text((index + 0.5) / len(panels), 0.965, label, ha="center", va="center", fontsize=13, color="#333333")
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, format="png")
