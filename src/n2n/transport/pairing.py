@@ -3,6 +3,7 @@
 import math
 
 import torch
+from jaxtyping import Float
 from torch import Tensor
 
 from n2n.shapes import LeafIndex, Points
@@ -23,7 +24,7 @@ class GlobalPairing:
         self.batch_size = batch_size
 
     def __call__(
-        self, queries: Points, targets: Points, generator: torch.Generator, same: bool = False
+        self, queries: Points, targets: Float[Tensor, "m 3"], generator: torch.Generator, same: bool = False
     ) -> tuple[LeafIndex, LeafIndex]:
         """Draw the subsets; see `StratifiedPairing.__call__`."""
         size = min(self.batch_size, len(queries), len(targets))
@@ -48,7 +49,7 @@ class StratifiedPairing:
         self.batch_size, self.leaf_size = batch_size, leaf_size
 
     def __call__(
-        self, queries: Points, targets: Points, generator: torch.Generator, same: bool = False
+        self, queries: Points, targets: Float[Tensor, "m 3"], generator: torch.Generator, same: bool = False
     ) -> tuple[LeafIndex, LeafIndex]:
         """Draw subsets and split them.
 
@@ -80,7 +81,7 @@ def _draw(count: int, size: int, generator: torch.Generator, device: torch.devic
     return torch.randperm(count, generator=generator)[:size].to(device)
 
 
-def _halve(points: Points, index: LeafIndex, axis: Tensor) -> LeafIndex:
+def _halve(points: Points, index: LeafIndex, axis: Tensor) -> Tensor:
     """Split every node (row) at the median of its own axis: (b, k) -> (2b, k / 2)."""
     coordinate = points[index].gather(2, axis[:, None, None].expand(-1, index.shape[1], 1)).squeeze(2)
     ordered = index.gather(1, coordinate.argsort(dim=1, stable=True))
