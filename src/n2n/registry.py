@@ -37,6 +37,10 @@ class Registry:
         """Return all known names, sorted; imports no component."""
         return sorted({*self._builtins, *self._registered, *self._plugins()})
 
+    def plugin_names(self) -> list[str]:
+        """Return the names that installed third-party packages add."""
+        return sorted(set(self._plugins()) - set(self._builtins))
+
     def describe(self, name: str) -> str:
         """Return one line about a component; imports only what third parties registered."""
         if name in self._builtins and name not in self._registered:

@@ -1,13 +1,12 @@
 """What a person sees while a command works: one progress bar, then a summary."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from n2n.fitting.callbacks import Report
-
+Report = Callable[[int, int, dict[str, float]], None]
 _console = Console(stderr=True, highlight=False)
 
 
@@ -19,11 +18,20 @@ def say(text: str, quiet: bool = False) -> None:
 
 @contextmanager
 def progress_bar(label: str, quiet: bool = False) -> Iterator[Report | None]:
-    """Yield a function for `fit(report=...)` that moves one bar; None when quiet."""
-    if quiet:
+    """Yield a function `report(done, total, values)` that moves one bar; None when quiet.
+
+    Where standard error is a file or a pipe, only the label is printed.
+    """
+    if quiet or not _console.is_terminal:
+        say(f"{label} ...", quiet)
         yield None
         return
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:>3.0f}%"), TimeElapsedColumn())
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:>3.0f}%"),
+        TimeElapsedColumn(),
+    )
     with Progress(*columns, console=_console, transient=True) as progress:
         task = progress.add_task(label, total=None)
 

@@ -1,90 +1,92 @@
 """`n2n fit`: the Hydra application. Every run has a folder named by its configuration."""
 
-import json
 import sys
-import time
-from pathlib import Path
+import traceback
 from typing import Any
 
-from n2n.compose import conf_dir, config_hash, plugin_search_paths, register_schema, validate
+from n2n.compose import conf_dir, hydra_arguments, register_schema, validate
 from n2n.errors import N2NError
-
-RUNS = Path("runs")
-
-
-def run_fit(arguments: list[str]) -> int:
-    """Hand the command line to Hydra; each job is `fit_job`."""
-    import hydra
-
-    if arguments in (["--help"], ["-h"]):
-        print(_HELP)
-        return 0
-    register_schema()
-    failures: list[str] = []
-
-    @hydra.main(config_path=str(conf_dir()), config_name="config", version_base="1.3")
-    def application(composed: Any) -> None:
-        try:
-            fit_job(validate(composed))
-        except N2NError as error:
-            failures.append(str(error))
-            print(f"n2n: error: {error}", file=sys.stderr)
-
-    search = ",".join(plugin_search_paths())
-    previous = sys.argv
-    sys.argv = ["n2n fit", *arguments, *([f"hydra.searchpath=[{search}]"] if search else [])]
-    try:
-        application()
-    except N2NError:
-        raise
-    except SystemExit as stop:
-        return int(stop.code or 0) and 2
-    finally:
-        sys.argv = previous
-    return 2 if failures else 0
-
 
 _HELP = """\
 usage: n2n fit [key=value ...] [-m] [--cfg job]
 
-Fit a field and keep it: leaves runs/<hash>/ with config.yaml, metrics.csv, summary.json and the field. Running the same
+Fit a field and keep it: leaves runs/HASH/ with config.yaml, metrics.csv, summary.json and the field. Running the same
 configuration again resumes an unfinished fit and leaves a finished one alone.
 
 examples:
+  n2n fit                                  a generated scan, to see that all is well
   n2n fit datamodule=files datamodule.paths=[scan.ply]
   n2n fit datamodule=files datamodule.paths=[scan.ply] recipe=paper distance=cd
+  n2n fit terms.zero_level.weight=0.1      a further term of the loss; `n2n list regulariser` knows the names
   n2n fit -m seed=0,1,2                    several runs, one after the other
   n2n fit --cfg job                        print the composed configuration
   n2n reconstruct --run runs/HASH -o mesh.ply
+
+Composition and sweeps are Hydra's (hydra.cc); --hydra-help prints its own flags.
 """
 
 
-def fit_job(config: dict[str, Any]) -> Path:
-    """Fit one configuration into runs/<hash>/, resuming what is there; return the folder."""
-    from hydra.utils import instantiate
-    from omegaconf import OmegaConf
+def run_fit(arguments: list[str]) -> int:
+    """Hand the command line to Hydra; each job is a fit of its own."""
+    if arguments in (["--help"], ["-h"]):
+        print(_HELP, end="")
+        return 0
+    import hydra
 
-    from n2n.cli.console import progress_bar, say
-    from n2n.fitting.fit import fit
-    from n2n.registry import DATAMODULES
-    from n2n.tasks.field import FIELD_FILE, Field
+    from n2n.cli.sweep import check_jobs
 
-    run_dir = RUNS / config_hash(config)
-    if (run_dir / FIELD_FILE).exists():
-        say(f"fit: {run_dir} is finished already; delete it to fit again, or change a setting")
-        return run_dir
-    data = DATAMODULES.build(config["datamodule"], num_observations=config["num_observations"])
-    run_dir.mkdir(parents=True, exist_ok=True)
-    OmegaConf.save(OmegaConf.create(config), run_dir / "config.yaml")
-    logger = instantiate({**config["logger"], "save_dir": str(run_dir)}) if config["logger"] else False
-    start = time.perf_counter()
-    with progress_bar("fitting") as report:
-        result = fit(data, config, run_dir, report, logger)
-    field = Field.of(result)
-    field.save(run_dir)
-    summary = {**field.report, "seconds": round(time.perf_counter() - start, 2), "config": field.config}
-    (run_dir / "summary.json").write_text(json.dumps(summary, indent=1, default=float) + "\n")
-    say(f"fit: {field.report['iterations']} iterations -> {run_dir}  ({time.perf_counter() - start:.0f} s)")
-    say(f"next: n2n reconstruct --run {run_dir} -o mesh.ply")
-    return run_dir
+    check_jobs(arguments)
+    register_schema()
+    outcomes: list[str | None] = []
 
+    @hydra.main(config_path=str(conf_dir()), config_name="config", version_base="1.3")
+    def application(composed: Any) -> None:
+        outcomes.append(_run_job(composed))
+
+    previous = sys.argv
+    sys.argv = ["n2n fit", *hydra_arguments(arguments)]
+    try:
+        application()
+    except KeyboardInterrupt:
+        print("\nthe same command resumes the run", file=sys.stderr)
+        raise
+    except SystemExit as stop:
+        if isinstance(stop.__context__, KeyboardInterrupt):
+            print("\nthe same command resumes the run", file=sys.stderr)
+            raise
+        return 2 if stop.code else 0
+    finally:
+        sys.argv = previous
+    return _report(outcomes)
+
+
+def _run_job(composed: Any) -> str | None:
+    """Run one job; a failure is told and remembered, and does not stop the rest of a sweep."""
+    from hydra.core.hydra_config import HydraConfig
+
+    from n2n.cli.console import say
+    from n2n.cli.job import fit_job
+
+    settings = HydraConfig.get().overrides.task
+    if HydraConfig.get().mode.name == "MULTIRUN":
+        say(f"job {HydraConfig.get().job.num}: {' '.join(settings)}")
+    try:
+        fit_job(validate(composed))
+    except N2NError as error:
+        print(f"n2n: error: {error}", file=sys.stderr)
+        return f"{' '.join(settings)}: {error}"
+    except Exception as error:
+        traceback.print_exc()
+        return f"{' '.join(settings)}: {type(error).__name__}: {error}"
+    return None
+
+
+def _report(outcomes: list[str | None]) -> int:
+    from n2n.cli.console import say
+
+    failures = [outcome for outcome in outcomes if outcome]
+    if len(outcomes) > 1:
+        say(f"fit: {len(outcomes) - len(failures)} of {len(outcomes)} jobs finished")
+        for failure in failures:
+            say(f"  failed: {failure}")
+    return 2 if failures else 0

@@ -1,97 +1,147 @@
-"""`n2n reconstruct | denoise | upsample`."""
+"""`n2n reconstruct | denoise | upsample`: read, fit or load, do the task, write, tell."""
 
 import argparse
 import time
 import warnings
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from n2n.cli.console import progress_bar, say
-from n2n.cli.inputs import Input, plan_outputs, read_inputs, split_overrides
-from n2n.formats import CLOUD_EXTENSIONS_WRITE, MESH_EXTENSIONS_WRITE, check_writable, write_cloud, write_mesh
+from n2n.cli.inputs import Input, read_inputs, split_overrides
+from n2n.cli.outputs import make_folder, plan_outputs
+from n2n.errors import ConfigError
+from n2n.formats import CLOUD_EXTENSIONS_WRITE, MESH_EXTENSIONS_WRITE, Cloud, check_writable, write_cloud, write_mesh
+
+if TYPE_CHECKING:
+    from n2n.tasks.field import Field
+
+_RESOLUTIONS = (8, 2048)
 
 
 def run_work(options: argparse.Namespace) -> int:
-    """Read, fit (or load), do the task, write, tell."""
-    start, quiet, task = time.perf_counter(), options.quiet, options.command
+    """Run one task; everything that can be wrong with the request is found before the fit."""
+    start = time.perf_counter()
+    task, quiet = options.command, options.quiet
     paths, overrides = split_overrides(options.inputs)
+    if options.run and overrides:
+        raise ConfigError(
+            f"{overrides[0]} has no effect on a finished run; leave it out, or leave out --run to fit anew"
+        )
     extensions = MESH_EXTENSIONS_WRITE if task == "reconstruct" else CLOUD_EXTENSIONS_WRITE
     outputs = plan_outputs(options.output, paths, extensions, per_input=task != "reconstruct")
     if options.preview:
         check_writable(options.preview, (".png",))
-    if not (options.run and task == "reconstruct" and not paths):
-        inputs = read_inputs(paths, quiet)
-    else:
-        inputs = []
-    field = _load(options) if options.run else _fit(options, inputs, overrides)
+    needs_points = not (options.run and task == "reconstruct")
+    inputs = read_inputs(paths, task, quiet) if paths or needs_points else []
+    _check_numbers(options, inputs)
 
-    if task == "reconstruct":
-        with progress_bar("extracting the surface", quiet):
-            mesh = field.reconstruct(options.resolution, options.edge)
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            write_mesh(outputs[0], mesh)
-        for warning in caught:
-            if issubclass(warning.category, UserWarning):
-                say(str(warning.message), quiet)
-        closed = "watertight" if mesh.is_watertight else "open"
-        done = f"{len(mesh.vertices):,} vertices, {len(mesh.faces):,} faces, {closed}"
-    else:
-        mesh = None
-        written = 0
-        for output, item in zip(outputs, inputs, strict=False):
-            result = _denoised(field, item) if task == "denoise" else _upsampled(field, item, options)
-            write_cloud(output, result)
-            written += len(result)
-        done = f"{written:,} points" + (f" in {len(outputs)} files" if len(outputs) > 1 else "")
-    if options.preview:
-        _preview(options.preview, field, inputs, mesh)
+    field = _load(options) if options.run else _fit(options, inputs, overrides)
+    make_folder(outputs[0].parent)
+    done = (_reconstruct if task == "reconstruct" else _move)(field, options, inputs, outputs)
     where = outputs[0] if len(outputs) == 1 else outputs[0].parent
     say(f"{task}: {done} -> {where}  ({time.perf_counter() - start:.0f} s)", quiet)
+    if task != "reconstruct" and len(outputs) < len(inputs):
+        say(f"only the first of {len(inputs)} inputs was written; -o FOLDER/ writes one result for each", quiet)
     return 0
 
 
-def _load(options: argparse.Namespace):
+def _check_numbers(options: argparse.Namespace, inputs: list[Input]) -> None:
+    if options.command == "upsample" and options.rate < 1:
+        raise ConfigError(f"--rate {options.rate} is out of range; give 1 or more points per point")
+    if options.command != "reconstruct":
+        return
+    low, high = _RESOLUTIONS
+    if options.edge is None:
+        if not low <= options.resolution <= high:
+            raise ConfigError(f"--resolution {options.resolution} is out of range; give {low} to {high} voxels")
+        return
+    if not 0 < options.edge < float("inf"):
+        raise ConfigError(f"--edge {options.edge} is out of range; give a positive length in the scan's units")
+    if inputs:
+        longest = float(np.ptp(inputs[0].points, axis=0).max())
+        if not low <= longest / options.edge <= high:
+            raise ConfigError(
+                f"--edge {options.edge:g} makes {longest / options.edge:.3g} voxels along the longest side "
+                f"({longest:.4g}); give {longest / high:.3g} to {longest / low:.3g}"
+            )
+
+
+def _load(options: argparse.Namespace) -> "Field":
     from n2n.tasks.field import Field
 
-    return Field.load(options.run, options.device)
+    field = Field.load(options.run, options.device)
+    if not 0 <= options.shape < len(field.frames):
+        raise ConfigError(
+            f"--shape {options.shape} is out of range; this run holds shapes 0 to {len(field.frames) - 1}"
+        )
+    return field
 
 
-def _fit(options: argparse.Namespace, inputs: list[Input], overrides: list[str]):
+def _fit(options: argparse.Namespace, inputs: list[Input], overrides: list[str]) -> "Field":
     from n2n.compose import compose
     from n2n.tasks.api import fit_clouds
 
-    given = [f"task={options.command}", f"device={options.device}", f"seed={options.seed}", *overrides]
-    config = compose(given)
+    if options.shape:
+        raise ConfigError(f"--shape {options.shape} chooses a shape of a run; give the run with --run")
+    config = compose([f"task={options.command}", f"device={options.device}", f"seed={options.seed}", *overrides])
     with progress_bar("fitting", options.quiet) as report:
         field = fit_clouds([item.points for item in inputs], config, report=report)
     facts = field.report
+    several = f" in {facts['observations'][0]} observations" if facts["observations"][0] > 1 else ""
     say(
-        f"{facts['points'][0]:,} points in {facts['observations'][0]} observation(s): noise {facts['noise'][0]:.3g}, "
-        f"spacing {facts['spacing'][0]:.3g} (estimated, in the scan's units); "
-        f"{facts['iterations']} iterations on {facts['device']}",
+        f"{facts['points'][0]:,} points{several}: noise {facts['noise'][0]:.3g}, spacing {facts['spacing'][0]:.3g} "
+        f"(estimated, in the scan's units); {facts['iterations']:,} iterations on {facts['device']}",
         options.quiet,
     )
     return field
 
 
-def _denoised(field, item: Input):
+def _reconstruct(field: "Field", options: argparse.Namespace, inputs: list[Input], outputs: list[Path]) -> str:
+    with progress_bar("extracting the surface", options.quiet):
+        mesh = field.reconstruct(options.resolution, options.edge, options.shape)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        write_mesh(outputs[0], mesh)
+    for warning in caught:
+        if issubclass(warning.category, UserWarning):
+            say(str(warning.message), options.quiet)
+    if options.preview:
+        before = inputs[0].points if inputs else None
+        _preview(options.preview, before, None if before is None else field.denoise(before, options.shape), mesh)
+    closed = "watertight" if mesh.is_watertight else "not watertight"
+    return f"{len(mesh.vertices):,} vertices, {len(mesh.faces):,} faces, {closed}"
+
+
+def _move(field: "Field", options: argparse.Namespace, inputs: list[Input], outputs: list[Path]) -> str:
+    move = _denoised if options.command == "denoise" else _upsampled
+    results = []
+    # A file takes the first input's result only; zip stops there.
+    for output, item in zip(outputs, inputs, strict=False):
+        results.append(move(field, item, options))
+        write_cloud(output, results[-1])
+    if options.preview:
+        after = results[0].points
+        _preview(options.preview, inputs[0].points, after[np.isfinite(after).all(axis=1)], None)
+    files = f" in {len(results)} files" if len(results) > 1 else ""
+    return f"{sum(map(len, results)):,} points{files}"
+
+
+def _denoised(field: "Field", item: Input, options: argparse.Namespace) -> Cloud:
     """Denoise the finite rows; others stay as they are, so that number and order hold."""
     points = item.cloud.points.copy()
-    points[item.finite] = field.denoise(item.points)
+    points[item.finite] = field.denoise(item.points, options.shape)
     return item.cloud.replace(points)
 
 
-def _upsampled(field, item: Input, options: argparse.Namespace):
-    points = field.upsample(item.points, options.rate, options.seed)
-    rows = np.tile(np.flatnonzero(item.finite), options.rate)
-    return item.cloud.replace(points, rows)
+def _upsampled(field: "Field", item: Input, options: argparse.Namespace) -> Cloud:
+    """Add points; each takes the attributes of the point it was made from."""
+    points = field.upsample(item.points, options.rate, options.seed, options.shape)
+    return item.cloud.replace(points, np.tile(np.flatnonzero(item.finite), options.rate))
 
 
-def _preview(path: str, field, inputs: list[Input], mesh) -> None:
+def _preview(path: str, before: np.ndarray | None, after: np.ndarray | None, mesh: object) -> None:
     from n2n.report.preview import draw_preview
 
-    before = inputs[0].points if inputs else None
-    after = field.denoise(before) if before is not None else None
-    draw_preview(Path(path), before, after, mesh if mesh is not None else field.reconstruct(192))
+    draw_preview(Path(path), before, after, mesh)

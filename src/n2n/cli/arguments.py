@@ -1,0 +1,102 @@
+"""The arguments of every command."""
+
+import argparse
+from collections.abc import Sequence
+
+from n2n import __version__
+from n2n.config import DEVICES
+
+_EPILOG = """\
+examples:
+  n2n reconstruct scan.ply -o mesh.ply                 a noisy scan in, a clean mesh out
+  n2n reconstruct a.ply b.ply c.ply -o mesh.ply        several observations of the same thing
+  n2n denoise scan.xyz -o clean.xyz                    same points, same order, on the surface
+  n2n upsample scan.xyz --rate 4 -o dense.xyz
+  n2n demo                                             see it work on a bundled scan
+  n2n fit recipe=paper datamodule=files datamodule.paths=[scan.ply]
+
+`n2n COMMAND --help` tells more. Settings are `key=value`, e.g. seed=1; `n2n fit --cfg job` prints them all.
+"""
+_READS = "ply xyz txt csv pts npy npz off obj stl pcd las laz bin"
+_WRITES = {"reconstruct": "ply obj off stl glb", "denoise": "ply xyz txt csv npy npz pcd las laz"}
+_TASKS = {
+    "reconstruct": (
+        "noisy points to a mesh",
+        "n2n reconstruct scan.ply -o mesh.ply --resolution 400 --preview picture.png\n"
+        "  n2n reconstruct a.ply b.ply c.ply -o mesh.ply --edge 0.5\n"
+        "  n2n reconstruct --run runs/0123456789 -o mesh.ply",
+    ),
+    "denoise": (
+        "move every point onto the surface",
+        "n2n denoise scan.xyz -o clean.xyz\n  n2n denoise a.ply b.ply c.ply -o clean/      one result per observation",
+    ),
+    "upsample": ("denoise and add points on the surface", "n2n upsample scan.xyz --rate 4 -o dense.xyz"),
+}
+
+
+def parser() -> argparse.ArgumentParser:
+    """Build the argument parser."""
+    top = argparse.ArgumentParser(
+        prog="n2n",
+        description="Clean surfaces from noisy point clouds, learned from the noise itself.",
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    top.add_argument("--version", action="version", version=f"n2n {__version__}")
+    commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    for task, (summary, examples) in _TASKS.items():
+        _add_task(commands, task, summary, examples)
+    fit = commands.add_parser("fit", help="fit a field and keep the run folder (the Hydra application)", add_help=False)
+    fit.add_argument("overrides", nargs=argparse.REMAINDER)
+    demo = commands.add_parser("demo", help="see the main job on a bundled noisy scan")
+    demo.add_argument("-o", "--output", default="out/demo", metavar="DIR", help="folder for the results (out/demo)")
+    listing = commands.add_parser("list", help="every registered component, one line each")
+    listing.add_argument("kind", nargs="?", help="only this kind, e.g. distance")
+    commands.add_parser("doctor", help="versions, devices, what is missing and what to do about it")
+    return top
+
+
+def _add_task(commands: argparse._SubParsersAction, task: str, summary: str, examples: str) -> None:
+    command = commands.add_parser(
+        task,
+        help=summary,
+        usage=f"n2n {task} FILE [FILE ...] -o OUTPUT [options] [key=value ...]",
+        description=f"{summary[0].upper()}{summary[1:]}. Several files are several observations of one thing.",
+        epilog=f"examples:\n  {examples}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    writes = _WRITES.get(task, _WRITES["denoise"])
+    command.add_argument("inputs", nargs="*", metavar="FILE", help=f"noisy points: {_READS}")
+    command.add_argument("-o", "--output", required=True, metavar="OUTPUT", help=f"file or folder/: {writes}")
+    if task == "reconstruct":
+        command.add_argument(
+            "--resolution", type=int, default=256, metavar="N", help="voxels along the longest side (256)"
+        )
+        command.add_argument("--edge", type=float, metavar="LENGTH", help="voxel edge in the scan's units instead")
+    if task == "upsample":
+        command.add_argument("--rate", type=int, default=4, metavar="R", help="points out per point in (4)")
+    command.add_argument("--preview", metavar="PNG", help="also draw before and after")
+    command.add_argument("--run", metavar="RUN", help="use the field of a run folder, no new fit")
+    command.add_argument(
+        "--shape", type=int, default=0, metavar="K", help="which shape of a run that holds several (0)"
+    )
+    command.add_argument("--device", default="auto", choices=DEVICES, help="where to compute (auto)")
+    command.add_argument("--seed", type=int, default=0, metavar="S", help="seed of everything random (0)")
+    command.add_argument("-q", "--quiet", action="store_true", help="no progress bar, no summary")
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Parse a command line; files and settings may stand before, between and after the options.
+
+    `n2n fit` keeps its arguments as they are: Hydra parses them.
+    """
+    if arguments[:1] == ["fit"]:
+        return argparse.Namespace(command="fit", overrides=list(arguments[1:]))
+    top = parser()
+    options, rest = top.parse_known_args(arguments)
+    unknown = [text for text in rest if text.startswith("-")]
+    if unknown or (rest and not hasattr(options, "inputs")):
+        top.error(f"unknown argument {(unknown or rest)[0]}; see n2n {options.command} --help")
+    if rest:
+        options.inputs += rest
+    return options

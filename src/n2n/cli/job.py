@@ -1,0 +1,62 @@
+"""One run: data, fit, and what stays in its folder."""
+
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from hydra.utils import instantiate
+from omegaconf import OmegaConf
+
+from n2n.cli.console import progress_bar, say
+from n2n.compose import config_hash
+from n2n.errors import OutputError
+from n2n.fitting.fit import fit
+from n2n.formats import atomic_path
+from n2n.registry import DATAMODULES
+from n2n.tasks.field import FIELD_FILE, Field
+
+RUNS = Path("runs")
+
+
+def fit_job(config: dict[str, Any]) -> Path:
+    """Fit one configuration into runs/<hash>/, resuming what is there; return the folder.
+
+    Args:
+        config: As composed and validated.
+
+    Raises:
+        N2NError: The data or the configuration cannot be used, or the folder cannot be written.
+    """
+    run_dir = RUNS / config_hash(config)
+    if (run_dir / FIELD_FILE).exists():
+        say(f"fit: {run_dir} is finished already; delete it to fit again, or change a setting")
+        return run_dir
+    data = DATAMODULES.build(config["datamodule"], num_observations=config["num_observations"])
+    try:
+        run_dir.mkdir(parents=True, exist_ok=True)
+        OmegaConf.save(OmegaConf.create(config), run_dir / "config.yaml")
+    except OSError as error:
+        raise OutputError(f"{run_dir}: cannot be written ({error.strerror}); run n2n in another folder") from error
+    start = time.perf_counter()
+    failed = True
+    try:
+        logger = instantiate({**config["logger"], "save_dir": str(run_dir)}) if config["logger"] else False
+        with progress_bar("fitting") as report:
+            result = fit(data, config, run_dir, report, logger)
+        failed = False
+    finally:
+        # A run that is not closed shows as still running for ever.
+        if "wandb" in sys.modules and sys.modules["wandb"].run is not None:
+            sys.modules["wandb"].finish(exit_code=int(failed))
+    field = Field.of(result)
+    seconds = time.perf_counter() - start
+    summary = {**field.report, "seconds": round(seconds, 2), "config": field.config}
+    with atomic_path(run_dir / "summary.json") as temporary:
+        temporary.write_text(json.dumps(summary, indent=1, default=float) + "\n")
+    # The field comes last: a folder that holds it is finished.
+    field.save(run_dir)
+    say(f"fit: {field.report['iterations']:,} iterations -> {run_dir}  ({seconds:.0f} s)")
+    say(f"next: n2n reconstruct --run {run_dir} -o mesh.ply")
+    return run_dir

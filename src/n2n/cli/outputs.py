@@ -1,0 +1,65 @@
+"""Where results go, decided and checked before anything expensive starts."""
+
+import tempfile
+from pathlib import Path
+
+from n2n.errors import OutputError
+from n2n.formats import check_writable
+
+
+def plan_outputs(output: str, paths: list[Path], extensions: tuple[str, ...], per_input: bool) -> list[Path]:
+    """Decide which files will be written, and check that they can be; nothing is created yet.
+
+    Args:
+        output: What the user gave to -o: a file, or a folder (existing, or ending in a separator).
+        paths: The inputs.
+        extensions: What this task can write.
+        per_input: A folder gets one result per input; otherwise one result, named after the first.
+
+    Raises:
+        OutputError: Unknown extension, unwritable place, or a result that would overwrite an input or another result.
+    """
+    folder = Path(output)
+    if not (output.endswith(("/", "\\")) or folder.is_dir()):
+        targets = [folder]
+        check_writable(folder, extensions)
+    else:
+        _check_folder(folder)
+        named = paths if per_input else paths[:1]
+        targets = [folder / (p.name if p.suffix.lower() in extensions else f"{p.stem}{extensions[0]}") for p in named]
+        if not targets:
+            raise OutputError(f"{folder}: is a folder; give a file name with -o, as no input names the result")
+        if len(set(targets)) < len(targets):
+            raise OutputError(f"{folder}: two inputs have the same file name, so one result would overwrite the other")
+        if folder.is_dir():
+            for target in targets:
+                check_writable(target, extensions)
+    inputs = {path.resolve() for path in paths}
+    for target in targets:
+        if target.resolve() in inputs:
+            raise OutputError(f"{target}: is an input; choose another name or folder with -o")
+    return targets
+
+
+def _check_folder(folder: Path) -> None:
+    """Find out whether a folder exists or can be made."""
+    nearest = next(parent for parent in (folder, *folder.absolute().parents) if parent.exists())
+    if not nearest.is_dir():
+        raise OutputError(f"{folder}: {nearest} is a file, not a folder; choose another folder with -o")
+    try:
+        with tempfile.TemporaryFile(dir=nearest):
+            pass
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot write there ({error.strerror}); choose another folder with -o") from error
+
+
+def make_folder(folder: Path) -> None:
+    """Create a folder for results.
+
+    Raises:
+        OutputError: It cannot be created.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be created ({error.strerror}); choose another folder with -o") from error
