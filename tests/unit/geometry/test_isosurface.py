@@ -7,6 +7,7 @@ import trimesh
 from skimage.measure import marching_cubes
 
 from n2n.errors import ConfigError, SurfaceError
+from n2n.geometry import marching
 from n2n.geometry.components import drop_small_components
 from n2n.geometry.isosurface import extract, voxel_size
 
@@ -159,8 +160,10 @@ def test_slope_two_loses_no_thin_plate():
     assert mesh.euler_number == 2
 
 
-def test_noise_on_every_corner_still_gives_a_closed_manifold():
+@pytest.mark.parametrize("tile", [16, 2])
+def test_noise_on_every_corner_still_gives_a_closed_manifold(tile, monkeypatch):
     """Random signs hold every ambiguous case; bricks and tiles must agree on all of them."""
+    monkeypatch.setattr(marching, "_TILE", tile)
     cells = 23
     values = np.random.default_rng(0).normal(size=(cells + 1,) * 3)
     for axis in range(3):
