@@ -1,0 +1,1 @@
+"""Distances for n2n, by somebody else."""

@@ -1,0 +1,1 @@
+"""YAML options; found through the entry point group `n2n.conf`."""
