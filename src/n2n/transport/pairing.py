@@ -41,8 +41,8 @@ class StratifiedPairing:
     its cost is a sum of small assignments and its variance that of the local spacing, not of the whole shape.
 
     Args:
-        batch_size: Points drawn from each cloud, rounded down to leaf_size * 2^d.
-        leaf_size: Points per leaf and side, >= 1.
+        batch_size: Points drawn from each cloud, rounded down to a multiple of the number of leaves 2^d.
+        leaf_size: Least points per leaf and side, >= 1; leaves hold fewer than twice as many.
     """
 
     def __init__(self, batch_size: int, leaf_size: int = 64) -> None:
@@ -63,9 +63,9 @@ class StratifiedPairing:
             Indices into queries and targets, (leaves, points per leaf) each.
         """
         size = min(self.batch_size, len(queries), len(targets))
-        leaf = min(self.leaf_size, size)
-        depth = int(math.log2(size / leaf))
-        size = leaf * 2**depth
+        depth = max(0, int(math.log2(size / self.leaf_size)))
+        # Leaves grow to less than twice their size rather than leave points out: every point carries information.
+        size = (size >> depth) << depth
         second = _draw(len(targets), size, generator, targets.device)[None]
         first = second if same else _draw(len(queries), size, generator, queries.device)[None]
         for _ in range(depth):
