@@ -33,9 +33,10 @@ def run_fit(arguments: list[str]) -> int:
         return 0
     import hydra
 
-    from n2n.cli.sweep import check_jobs
+    from n2n.cli.sweep import check_jobs, split_arguments
 
-    check_jobs(arguments)
+    settings, flags = split_arguments(arguments)
+    check_jobs(settings, flags)
     register_schema()
     outcomes: list[str | None] = []
 
@@ -44,7 +45,7 @@ def run_fit(arguments: list[str]) -> int:
         outcomes.append(_run_job(composed))
 
     previous = sys.argv
-    sys.argv = ["n2n fit", *hydra_arguments(arguments)]
+    sys.argv = ["n2n fit", *hydra_arguments(settings), *flags]
     try:
         application()
     except KeyboardInterrupt:

@@ -1,6 +1,6 @@
 """Check every job of a `n2n fit` command line before the first one starts."""
 
-from itertools import chain, islice
+from itertools import chain, islice, pairwise
 
 from n2n.compose import compose
 from n2n.errors import ConfigError
@@ -12,34 +12,32 @@ _WITH_VALUE = ("--cfg", "-c", "--package", "-p", "--info", "-i")
 _OTHER_CONF = ("--config-dir", "-cd", "--config-path", "-cp", "--config-name", "-cn")
 
 
-def check_jobs(arguments: list[str]) -> None:
+def check_jobs(settings: list[str], flags: list[str]) -> None:
     """Compose what the command line asks for; of a sweep, every value once.
 
     Raises:
         ConfigError: The first thing that is wrong, in one line. Hydra would say it in twenty, and after other jobs ran.
     """
-    overrides = settings_of(arguments)
-    if overrides is None:
+    if any(flag.partition("=")[0] in _OTHER_CONF for flag in flags) or "--hydra-help" in flags:
         return
-    for job in sweep_samples(overrides):
+    if any(setting.startswith("hydra.searchpath=") for setting in settings):
+        return
+    for job in sweep_samples(settings):
         compose(job)
 
 
-def settings_of(arguments: list[str]) -> list[str] | None:
-    """Return the `key=value` arguments among Hydra's flags; None where they cannot be checked from here."""
-    settings, skip = [], False
-    for argument in arguments:
-        if argument.partition("=")[0] in _OTHER_CONF or argument.startswith(("hydra.searchpath=", "--hydra-help")):
-            return None
-        if argument.startswith("-"):
-            # `--info` may stand alone, so its value is only skipped where it is none of ours.
-            skip = argument in _WITH_VALUE
-            continue
-        if skip and "=" not in argument:
-            skip = False
-            continue
-        settings.append(argument)
-    return settings
+def split_arguments(arguments: list[str]) -> tuple[list[str], list[str]]:
+    """Tell settings from Hydra's flags and their values, so that they may be mixed; Hydra alone refuses that.
+
+    >>> split_arguments(["seed=1", "--cfg", "job", "distance=cd", "-m"])
+    (['seed=1', 'distance=cd'], ['--cfg', 'job', '-m'])
+    """
+    settings: list[str] = []
+    flags: list[str] = []
+    for before, argument in pairwise(["", *arguments]):
+        is_value = before in (*_WITH_VALUE, *_OTHER_CONF) and "=" not in argument
+        (flags if argument.startswith("-") or is_value else settings).append(argument)
+    return settings, flags
 
 
 def sweep_samples(overrides: list[str]) -> list[list[str]]:
