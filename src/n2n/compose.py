@@ -103,10 +103,9 @@ def _own_hydra() -> Iterator[None]:
     """Give Hydra's global state back afterwards: the caller may be a Hydra application itself."""
     from hydra.core.global_hydra import GlobalHydra
 
-    instance = GlobalHydra.instance()
-    theirs = instance.hydra
-    instance.clear()
+    theirs = GlobalHydra.instance().hydra
+    GlobalHydra.instance().clear()
     try:
         yield
     finally:
-        instance.hydra = theirs
+        GlobalHydra.instance().hydra = theirs

@@ -102,7 +102,7 @@ def _whole(key: str, value: Any, lowest: int) -> Any:
     return int(value)
 
 
-def _at_least(key: str, value: Any, lowest: float) -> None:
+def _at_least(key: str, value: Any, lowest: int) -> None:
     if value == AUTO:
         return
     if isinstance(value, bool) or not isinstance(value, int | float):

@@ -25,7 +25,11 @@ _GRAPH_NEIGHBOURS = 10
 
 
 def orient(
-    points: NDArray[np.float64], normals: NDArray[np.float64], areas: NDArray[np.float64], seed: int = 0
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    areas: NDArray[np.float64],
+    blur: float = 0.0,
+    seed: int = 0,
 ) -> NDArray[np.float64]:
     """Flip normals so that they are consistent; every connected sheet with an inside points outwards.
 
@@ -33,13 +37,14 @@ def orient(
         points: (n, 3) positions close to the surface; cost grows with n^2, n <= 5000 is sensible.
         normals: (n, 3) unit normals of arbitrary sign.
         areas: (n,) surface area each point stands for.
+        blur: How far off the surface the points may be; closer pairs than this say little about each other.
         seed: Seed of the stochastic search.
 
     Returns:
         (n, 3) oriented unit normals.
     """
     generator = np.random.default_rng(seed)
-    energy = dipole_energy(points, normals, areas)
+    energy = dipole_energy(points, normals, areas, blur)
     graph = _neighbour_graph(points, normals)
     starts = [_spanning_tree_signs(graph, normals), _leading_eigenvector_signs(energy, generator)]
     found = [_search(energy, signs, generator) for signs in starts]
@@ -47,10 +52,12 @@ def orient(
     return _point_outwards(points, normals * best.numpy()[:, None], areas, graph)
 
 
-def dipole_energy(points: NDArray[np.float64], normals: NDArray[np.float64], areas: NDArray[np.float64]) -> Tensor:
-    """Return the symmetric coupling matrix M, (n, n) float32, regularised at the scale of the point spacing."""
+def dipole_energy(
+    points: NDArray[np.float64], normals: NDArray[np.float64], areas: NDArray[np.float64], blur: float = 0.0
+) -> Tensor:
+    """Return the symmetric coupling matrix M, (n, n) float32, regularised at the scale of the point spacing and blur."""
     p, n, a = (torch.as_tensor(x, dtype=torch.float32) for x in (points, normals, areas))
-    squared = torch.cdist(p, p).square() + float(a.median())
+    squared = torch.cdist(p, p).square() + float(a.median()) + blur**2
     own = (p * n).sum(1)
     # (p_i - p_j) . n_i and (p_i - p_j) . n_j from matrix products instead of an (n, n, 3) array.
     along_i = own[:, None] - n @ p.T

@@ -45,7 +45,7 @@ class Scaffold:
         k = min(_AREA_NEIGHBOURS, len(points))
         reach = cKDTree(points).query(points, k)[0][:, -1]
         areas = np.pi * reach**2 / k
-        return cls(points, orient(points, normals, areas, seed), areas)
+        return cls(points, orient(points, normals, areas, scales.noise, seed), areas)
 
     def sign(self, queries: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return -1 where the winding number says inside and +1 elsewhere, (q,)."""

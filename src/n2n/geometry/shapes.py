@@ -29,10 +29,10 @@ def bracket(p: NDArray[np.float64]) -> NDArray[np.float64]:
     base = _box(p, (0, 0, 5), (60, 35, 5))
     wall = _box(p, (-56, 0, 40), (4, 35, 40))
     gusset = np.maximum(_box(p, (-32, 0, 30), (28, 3, 28)), ((p[:, 0] + 10) + (p[:, 2] - 28)) / np.sqrt(2))
-    boss = _cylinder(p, (28, 0, 17), 2, 18, 17)
+    boss = _cylinder(p, (28, 0, 17), 2, 18.0, 17.0)
     solid = np.minimum.reduce([base, wall, gusset, boss])
-    bore = _cylinder(p, (28, 0, 17), 2, 10, 40)
-    window = _cylinder(p, (-56, 0, 55), 0, 14, 20)
+    bore = _cylinder(p, (28, 0, 17), 2, 10.0, 40.0)
+    window = _cylinder(p, (-56, 0, 55), 0, 14.0, 20.0)
     return np.maximum(solid, -np.minimum(bore, window))
 
 
