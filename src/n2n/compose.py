@@ -14,8 +14,10 @@ from n2n.config import OPEN_KEYS, Config
 from n2n.errors import ConfigError
 from n2n.gates import check_components
 from n2n.messages import explain, unknown_key
+from n2n.registry import suggest
 
 CONF_PLUGINS = "n2n.conf"
+_CHOICE = re.compile(r"\+{0,2}([\w/]+)=([\w.-]*)")
 _OPEN = re.compile(rf"(?:{'|'.join(OPEN_KEYS)})\.[\w.]+=")
 
 
@@ -67,6 +69,7 @@ def compose(overrides: Sequence[str] = ()) -> dict[str, Any]:
     with _own_hydra():
         try:
             with initialize_config_dir(str(conf_dir()), version_base="1.3", job_name="n2n"):
+                _check_choices(overrides)
                 composed = hydra_compose("config", overrides=hydra_arguments(overrides))
         except Exception as error:
             raise ConfigError(explain(error)) from error
@@ -91,6 +94,22 @@ def validate(composed: Any) -> dict[str, Any]:
     config = asdict(typed)
     check_components(config)
     return config
+
+
+def _check_choices(overrides: Sequence[str]) -> None:
+    """Refuse options that no folder of conf/ holds: Hydra ignores a typo where the group is optional (debug=defualt)."""
+    from hydra.core.global_hydra import GlobalHydra
+
+    search = [f"hydra.searchpath=[{','.join(plugin_search_paths())}]"]
+    loader = GlobalHydra.instance().hydra.config_loader
+    for text in overrides:
+        choice = _CHOICE.fullmatch(text)
+        if choice is None:
+            continue
+        group, option = choice.groups()
+        options = loader.get_group_options(group, overrides=search)
+        if options and option not in options:
+            raise ConfigError(f"Unknown {group} {option!r}.{suggest(option, options)}")
 
 
 def config_hash(config: dict[str, Any]) -> str:

@@ -2,9 +2,12 @@
 
 import argparse
 from collections.abc import Sequence
+from typing import NoReturn
 
 from n2n import __version__
 from n2n.config import DEVICES
+from n2n.errors import ConfigError
+from n2n.registry import suggest
 
 _EPILOG = """\
 examples:
@@ -34,9 +37,16 @@ _TASKS = {
 }
 
 
+class _Parser(argparse.ArgumentParser):
+    """A parser whose complaints are one line like every other error, not a usage text and a line."""
+
+    def error(self, message: str) -> NoReturn:
+        raise ConfigError(f"{message}; see `{self.prog} --help`")
+
+
 def parser() -> argparse.ArgumentParser:
     """Build the argument parser."""
-    top = argparse.ArgumentParser(
+    top = _Parser(
         prog="n2n",
         description="Clean surfaces from noisy point clouds, learned from the noise itself.",
         epilog=_EPILOG,
@@ -93,10 +103,21 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     if arguments[:1] == ["fit"]:
         return argparse.Namespace(command="fit", overrides=list(arguments[1:]))
     top = parser()
+    commands = next(action for action in top._actions if isinstance(action, argparse._SubParsersAction)).choices
+    if not arguments:
+        raise ConfigError(f"no command given; choose one of: {', '.join(commands)}; see `n2n --help`")
+    if not arguments[0].startswith("-") and arguments[0] not in commands:
+        raise ConfigError(f"Unknown command {arguments[0]!r}.{suggest(arguments[0], list(commands))}")
     options, rest = top.parse_known_args(arguments)
     unknown = [text for text in rest if text.startswith("-")]
     if unknown or (rest and not hasattr(options, "inputs")):
-        top.error(f"unknown argument {(unknown or rest)[0]}; see n2n {options.command} --help")
+        _refuse(commands[options.command], (unknown or rest)[0])
     if rest:
         options.inputs += rest
     return options
+
+
+def _refuse(command: argparse.ArgumentParser, argument: str) -> NoReturn:
+    flags = [flag for action in command._actions for flag in action.option_strings if flag.startswith("--")]
+    hint = suggest(argument.partition("=")[0], flags) if argument.startswith("-") else ""
+    raise ConfigError(f"{command.prog} does not know the argument {argument!r}.{hint} See `{command.prog} --help`")

@@ -20,11 +20,14 @@ def say(text: str, quiet: bool = False) -> None:
 def progress_bar(label: str, quiet: bool = False) -> Iterator[Report | None]:
     """Yield a function `report(done, total, values)` that moves one bar; None when quiet.
 
-    Where standard error is a file or a pipe, only the label is printed.
+    Where standard error is a file or a pipe, only the label is printed, at the first report: what fails before there is
+    progress leaves its error message alone on the screen.
     """
-    if quiet or not _console.is_terminal:
-        say(f"{label} ...", quiet)
+    if quiet:
         yield None
+        return
+    if not _console.is_terminal:
+        yield _announcing(label)
         return
     columns = (
         TextColumn("{task.description}"),
@@ -39,3 +42,16 @@ def progress_bar(label: str, quiet: bool = False) -> Iterator[Report | None]:
             progress.update(task, completed=done, total=total)
 
         yield report
+
+
+def _announcing(label: str) -> Report:
+    """Return a report that prints the label once."""
+    announced = False
+
+    def report(done: int, total: int, values: dict[str, float]) -> None:
+        nonlocal announced
+        if not announced:
+            announced = True
+            say(f"{label} ...")
+
+    return report

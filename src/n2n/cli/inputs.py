@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from n2n.cli.console import say
 from n2n.errors import InputError
 from n2n.formats import Cloud, read_cloud
 from n2n.geometry.checks import check_cloud
@@ -43,8 +42,8 @@ def split_overrides(arguments: list[str]) -> tuple[list[Path], list[str]]:
     return [Path(name) for name in files], overrides
 
 
-def read_inputs(paths: list[Path], task: str, quiet: bool = False) -> list[Input]:
-    """Read and check every cloud; say what is unusual about it.
+def read_inputs(paths: list[Path], task: str) -> list[Input]:
+    """Read and check every cloud.
 
     Raises:
         InputError: No input, or one that cannot be read or fitted.
@@ -54,14 +53,20 @@ def read_inputs(paths: list[Path], task: str, quiet: bool = False) -> list[Input
     inputs = []
     for path in paths:
         cloud = read_cloud(path)
-        finite = cloud.finite()
-        if not finite.all():
-            happens = _WHAT_HAPPENS.get(task, "they are left out")
-            say(f"{path}: {int((~finite).sum()):,} of {len(cloud):,} rows are NaN or infinite; {happens}", quiet)
-        item = Input(path, cloud, finite)
-        check_cloud(item.points, str(path))
-        repeated = len(item.points) - len(np.unique(item.points, axis=0))
-        if repeated:
-            say(f"{path}: {repeated:,} of {len(item.points):,} points are duplicates", quiet)
+        item = Input(path, cloud, cloud.finite())
+        left_out = len(cloud) - len(item.points)
+        check_cloud(item.points, f"{path} (without {left_out:,} NaN or infinite rows)" if left_out else str(path))
         inputs.append(item)
     return inputs
+
+
+def remarks(item: Input, task: str) -> list[str]:
+    """Return one line for each thing about a cloud that its owner may not know."""
+    lines, left_out = [], len(item.cloud) - len(item.points)
+    if left_out:
+        happens = _WHAT_HAPPENS.get(task, "they are left out")
+        lines.append(f"{item.path}: {left_out:,} of {len(item.cloud):,} rows are NaN or infinite; {happens}")
+    repeated = len(item.points) - len(np.unique(item.points, axis=0))
+    if repeated:
+        lines.append(f"{item.path}: {repeated:,} of {len(item.points):,} points are duplicates")
+    return lines

@@ -1,6 +1,7 @@
 """One run: data, fit, and what stays in its folder."""
 
 import json
+import shutil
 import sys
 import time
 from pathlib import Path
@@ -11,8 +12,8 @@ from omegaconf import OmegaConf
 
 from n2n.cli.console import progress_bar, say
 from n2n.compose import config_hash
-from n2n.errors import OutputError
-from n2n.fitting.fit import fit
+from n2n.errors import ConfigError, OutputError
+from n2n.fitting.fit import LAST_CHECKPOINT, fit, pick_device
 from n2n.formats import atomic_path
 from n2n.registry import DATAMODULES
 from n2n.tasks.field import FIELD_FILE, Field
@@ -33,7 +34,9 @@ def fit_job(config: dict[str, Any]) -> Path:
     if (run_dir / FIELD_FILE).exists():
         say(f"fit: {run_dir} is finished already; delete it to fit again, or change a setting")
         return run_dir
-    data = DATAMODULES.build(config["datamodule"], num_observations=config["num_observations"])
+    pick_device(config["device"])
+    data = _read_data(config)
+    is_new = not run_dir.exists()
     try:
         run_dir.mkdir(parents=True, exist_ok=True)
         OmegaConf.save(OmegaConf.create(config), run_dir / "config.yaml")
@@ -46,6 +49,11 @@ def fit_job(config: dict[str, Any]) -> Path:
         with progress_bar("fitting") as report:
             result = fit(data, config, run_dir, report, logger)
         failed = False
+    except Exception:
+        # Nothing there is worth resuming, and nothing else tells a failed run from an unfinished one.
+        if is_new and not (run_dir / LAST_CHECKPOINT).exists():
+            shutil.rmtree(run_dir, ignore_errors=True)
+        raise
     finally:
         # A run that is not closed shows as still running for ever.
         if "wandb" in sys.modules and sys.modules["wandb"].run is not None:
@@ -60,3 +68,14 @@ def fit_job(config: dict[str, Any]) -> Path:
     say(f"fit: {field.report['iterations']:,} iterations -> {run_dir}  ({seconds:.0f} s)")
     say(f"next: n2n reconstruct --run {run_dir} -o mesh.ply")
     return run_dir
+
+
+def _read_data(config: dict[str, Any]) -> Any:
+    """Build the datamodule; its own complaint about an argument's value becomes an error the user can act on."""
+    spec = config["datamodule"]
+    try:
+        return DATAMODULES.build(spec, num_observations=config["num_observations"])
+    except (ValueError, TypeError) as error:
+        raise ConfigError(
+            f"datamodule {spec['name']!r} cannot use its settings ({error}); see conf/datamodule/"
+        ) from error

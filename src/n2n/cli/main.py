@@ -7,14 +7,15 @@ from collections.abc import Sequence
 from n2n.cli.arguments import parse
 from n2n.errors import N2NError
 
-DONE, FAILED, INTERRUPTED = 0, 2, 130
+DONE, FAILED, BROKEN, INTERRUPTED = 0, 2, 3, 130
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command.
 
     Returns:
-        Exit code: 0 done, 1 something is missing (doctor), 2 an error the user can mend, 130 interrupted.
+        Exit code: 0 done, 1 something is missing (doctor), 2 an error the user can mend, 3 an error of n2n
+        itself, 130 interrupted.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
     try:
@@ -23,8 +24,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _fail(str(error))
     except MemoryError:
         return _fail("not enough memory; use fewer points, a lower --resolution or a smaller batch_size")
-    except KeyboardInterrupt:
-        return _interrupted()
+    except KeyboardInterrupt as stop:
+        return _interrupted(str(stop))
     except SystemExit as stop:
         # Lightning turns Ctrl-C into an exit of its own.
         if isinstance(stop.__context__, KeyboardInterrupt):
@@ -34,6 +35,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         # The reader of our output has gone (n2n list | head); the interpreter would complain once more at exit.
         sys.stdout = None
         return DONE
+    except Exception as error:
+        return _broken(error)
 
 
 def _dispatch(options: argparse.Namespace) -> int:
@@ -60,12 +63,22 @@ def _dispatch(options: argparse.Namespace) -> int:
 
 
 def _fail(message: str) -> int:
-    print(f"n2n: error: {message}", file=sys.stderr)
+    print("n2n: error:", message.replace("\n", " "), file=sys.stderr)
     return FAILED
 
 
-def _interrupted() -> int:
-    print("\nn2n: interrupted; no unfinished file was left", file=sys.stderr)
+def _broken(error: Exception) -> int:
+    """Say where n2n itself failed, in one line; whoever wants to mend it asks for the rest."""
+    from n2n.messages import unexpected
+
+    _fail(unexpected(error))
+    return BROKEN
+
+
+def _interrupted(advice: str = "") -> int:
+    # A terminal shows ^C at the start of the line.
+    start = "\n" if sys.stderr.isatty() else ""
+    print(f"{start}n2n: interrupted; {advice or 'no unfinished file was left'}", file=sys.stderr)
     return INTERRUPTED
 
 

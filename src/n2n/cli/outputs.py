@@ -41,9 +41,25 @@ def plan_outputs(output: str, paths: list[Path], extensions: tuple[str, ...], pe
     return targets
 
 
+def check_preview(preview: Path, folder: Path) -> None:
+    """Check that a picture can be written, perhaps into the folder that the results will have made by then.
+
+    Raises:
+        OutputError: Not a .png, or an unwritable place.
+    """
+    if preview.parent.absolute() == folder.absolute() and not folder.exists():
+        _check_folder(folder)
+        preview = _nearest(folder) / preview.name
+    check_writable(preview, (".png",))
+
+
+def _nearest(folder: Path) -> Path:
+    return next(parent for parent in (folder, *folder.absolute().parents) if parent.exists())
+
+
 def _check_folder(folder: Path) -> None:
     """Find out whether a folder exists or can be made."""
-    nearest = next(parent for parent in (folder, *folder.absolute().parents) if parent.exists())
+    nearest = _nearest(folder)
     if not nearest.is_dir():
         raise OutputError(f"{folder}: {nearest} is a file, not a folder; choose another folder with -o")
     try:

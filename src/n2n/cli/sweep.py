@@ -1,10 +1,12 @@
 """Check every job of a `n2n fit` command line before the first one starts."""
 
 from itertools import chain, islice, pairwise
+from typing import NoReturn
 
 from n2n.compose import compose
 from n2n.errors import ConfigError
 from n2n.messages import explain
+from n2n.registry import suggest
 
 _VALUES_PER_KEY = 20
 # Flags of Hydra that take a value, and those after which conf/ is not what n2n ships.
@@ -22,8 +24,29 @@ def check_jobs(settings: list[str], flags: list[str]) -> None:
         return
     if any(setting.startswith("hydra.searchpath=") for setting in settings):
         return
-    for job in sweep_samples(settings):
+    is_sweep = any(flag in ("-m", "--multirun") for flag in flags)
+    for job in sweep_samples(settings) if is_sweep else [settings]:
         compose(job)
+
+
+def check_flags(flags: list[str]) -> None:
+    """Refuse what Hydra would refuse, in one line.
+
+    Raises:
+        ConfigError: Unknown flag, or a flag without its value.
+    """
+    from hydra._internal.utils import get_args_parser
+
+    hydra = get_args_parser()
+    known = [flag for action in hydra._actions for flag in action.option_strings]
+
+    def refuse(message: str) -> NoReturn:
+        unknown = message.removeprefix("unrecognized arguments: ")
+        hint = suggest(unknown, known) if unknown != message else ""
+        raise ConfigError(f"n2n fit: {message}.{hint} See `n2n fit --help`; settings are key=value")
+
+    hydra.error = refuse
+    hydra.parse_args([flag for flag in flags if flag != "--version"])
 
 
 def split_arguments(arguments: list[str]) -> tuple[list[str], list[str]]:

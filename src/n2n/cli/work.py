@@ -4,15 +4,15 @@ import argparse
 import time
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from n2n.cli.console import progress_bar, say
-from n2n.cli.inputs import Input, read_inputs, split_overrides
-from n2n.cli.outputs import make_folder, plan_outputs
+from n2n.cli.inputs import Input, read_inputs, remarks, split_overrides
+from n2n.cli.outputs import check_preview, make_folder, plan_outputs
 from n2n.errors import ConfigError
-from n2n.formats import CLOUD_EXTENSIONS_WRITE, MESH_EXTENSIONS_WRITE, Cloud, check_writable, write_cloud, write_mesh
+from n2n.formats import CLOUD_EXTENSIONS_WRITE, MESH_EXTENSIONS_WRITE, Cloud, write_cloud, write_mesh
 
 if TYPE_CHECKING:
     from n2n.tasks.field import Field
@@ -32,13 +32,15 @@ def run_work(options: argparse.Namespace) -> int:
     extensions = MESH_EXTENSIONS_WRITE if task == "reconstruct" else CLOUD_EXTENSIONS_WRITE
     outputs = plan_outputs(options.output, paths, extensions, per_input=task != "reconstruct")
     if options.preview:
-        check_writable(options.preview, (".png",))
+        check_preview(Path(options.preview), outputs[0].parent)
     needs_points = not (options.run and task == "reconstruct")
-    inputs = read_inputs(paths, task, quiet) if paths or needs_points else []
+    inputs = read_inputs(paths, task) if paths or needs_points else []
     _check_numbers(options, inputs)
-
-    field = _load(options) if options.run else _fit(options, inputs, overrides)
-    make_folder(outputs[0].parent)
+    ready = _load(options) if options.run else _configure(options, overrides)
+    # Remarks wait until nothing is wrong any more: an error stands alone.
+    for remark in (line for item in inputs for line in remarks(item, task)):
+        say(remark, quiet)
+    field = _fit(options, inputs, ready) if isinstance(ready, dict) else ready
     done = (_reconstruct if task == "reconstruct" else _move)(field, options, inputs, outputs)
     where = outputs[0] if len(outputs) == 1 else outputs[0].parent
     say(f"{task}: {done} -> {where}  ({time.perf_counter() - start:.0f} s)", quiet)
@@ -79,13 +81,22 @@ def _load(options: argparse.Namespace) -> "Field":
     return field
 
 
-def _fit(options: argparse.Namespace, inputs: list[Input], overrides: list[str]) -> "Field":
+def _configure(options: argparse.Namespace, overrides: list[str]) -> dict[str, Any]:
+    """Compose the fit's configuration; a setting `seed=1` wins over --seed, for everything random."""
     from n2n.compose import compose
-    from n2n.tasks.api import fit_clouds
+    from n2n.fitting.fit import pick_device
 
     if options.shape:
         raise ConfigError(f"--shape {options.shape} chooses a shape of a run; give the run with --run")
     config = compose([f"task={options.command}", f"device={options.device}", f"seed={options.seed}", *overrides])
+    pick_device(config["device"])
+    options.seed = config["seed"]
+    return config
+
+
+def _fit(options: argparse.Namespace, inputs: list[Input], config: dict[str, Any]) -> "Field":
+    from n2n.tasks.api import fit_clouds
+
     with progress_bar("fitting", options.quiet) as report:
         field = fit_clouds([item.points for item in inputs], config, report=report)
     facts = field.report
@@ -103,6 +114,7 @@ def _reconstruct(field: "Field", options: argparse.Namespace, inputs: list[Input
         mesh = field.reconstruct(options.resolution, options.edge, options.shape)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
+        make_folder(outputs[0].parent)
         write_mesh(outputs[0], mesh)
     for warning in caught:
         if issubclass(warning.category, UserWarning):
@@ -120,6 +132,7 @@ def _move(field: "Field", options: argparse.Namespace, inputs: list[Input], outp
     # A file takes the first input's result only; zip stops there.
     for output, item in zip(outputs, inputs, strict=False):
         results.append(move(field, item, options))
+        make_folder(output.parent)
         write_cloud(output, results[-1])
     if options.preview:
         after = results[0].points
