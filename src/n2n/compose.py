@@ -97,7 +97,7 @@ def validate(composed: Any) -> dict[str, Any]:
 
 
 def _check_choices(overrides: Sequence[str]) -> None:
-    """Refuse options that no folder of conf/ holds: Hydra ignores a typo where the group is optional (debug=defualt)."""
+    """Refuse options that no folder of conf/ holds: of an optional group (debug=defualt) Hydra ignores them."""
     from hydra.core.global_hydra import GlobalHydra
 
     search = [f"hydra.searchpath=[{','.join(plugin_search_paths())}]"]

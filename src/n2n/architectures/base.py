@@ -1,10 +1,11 @@
 """What every signed distance field offers to the losses and the tasks."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import torch
 from torch import Tensor, nn
+from torch.nn import functional
 
 from n2n.shapes import Index, Points, Values
 
@@ -38,6 +39,9 @@ class SDF(nn.Module):
         """Let several evaluations at the same parameters share work; a plain network has none to share."""
         yield
 
+    def start_from(self, distance: Callable[[Points], Values], condition: int = 0) -> None:
+        """Start from an approximate signed distance, where that is cheap; a network starts from its sphere."""
+
     def set_band(self, points: Points, radius: float, condition: int = 0) -> None:
         """Say where the surface may lie: within `radius` of the points. `roughness` is measured there."""
         self._bands = {**getattr(self, "_bands", {}), condition: (points, radius)}
@@ -54,7 +58,7 @@ class SDF(nn.Module):
         for condition, (points, radius) in self._bands.items():
             chosen = torch.randint(len(points), (_ROUGHNESS_SAMPLES,), generator=generator).to(points.device)
             offset = (2 * torch.rand(len(chosen), 3, generator=generator) - 1).to(points) * radius
-            direction = torch.nn.functional.normalize(torch.randn(len(chosen), 3, generator=generator).to(points), dim=-1)
+            direction = functional.normalize(torch.randn(len(chosen), 3, generator=generator).to(points), dim=-1)
             here = points[chosen] + offset
             step = 0.1 * radius
             code = torch.full((len(chosen),), condition, dtype=torch.long, device=points.device)

@@ -1,7 +1,7 @@
 """A multi-resolution grid of quadratic B-splines: linear in its parameters, value and gradient in closed form."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import torch
@@ -17,9 +17,9 @@ _MAX_CELLS = 256**3
 class Grid(SDF):
     """f(q) = sum_k c_k B(q / h - k): quadratic B-splines on a regular grid, continuously differentiable.
 
-    The coefficients are a sum of grids, each twice as fine as the one before. Halving a quadratic B-spline grid is exact
-    (coefficients are interpolated linearly), so the sum is evaluated on the finest grid only; the coarse grids make
-    gradient descent converge in a hundred steps and carry the sign far from the data.
+    The coefficients are a sum of grids, each twice as fine as the one before. Halving a quadratic B-spline grid is
+    exact (coefficients are interpolated linearly), so the sum is evaluated on the finest grid only; the coarse grids
+    make gradient descent converge in a hundred steps and carry the sign far from the data.
 
     Args:
         voxel: Edge length h of a cell of the finest grid, unit coordinates, > 0.
@@ -69,7 +69,7 @@ class Grid(SDF):
             return self._shared
         total = self.levels[0]
         for level in self.levels[1:]:
-            total = functional.interpolate(total, scale_factor=2, mode="trilinear", align_corners=False) + level
+            total = _finer(total) + level
         return total.squeeze(1)
 
     @contextmanager
@@ -118,6 +118,20 @@ class Grid(SDF):
         cell = (taps[:, 0, :, None, None] * ny + taps[:, 1, None, :, None]) * nz + taps[:, 2, None, None, :]
         return cell.reshape(-1, 27), weight, slope
 
+    def start_from(self, distance: Callable[[Points], Values], condition: int = 0) -> None:
+        """Set all levels but the finest to a distance: the spline coefficients of a smooth function are its values."""
+        with torch.no_grad():
+            total = torch.zeros_like(self.levels[0][condition : condition + 1])
+            for level in self.levels[:-1]:
+                cells = level.shape[2:]
+                if total.shape[2:] != cells:
+                    total = _finer(total)
+                centres = [(torch.arange(n, device=level.device) + 0.5) / n for n in cells]
+                nodes = torch.stack(torch.meshgrid(*centres, indexing="ij"), -1) * self.size + self.lower
+                value = distance(nodes.reshape(-1, 3)).to(level).reshape(cells)
+                level[condition, 0] = value - total[0, 0]
+                total = value[None, None]
+
     def set_band(self, points: Points, radius: float, condition: int = 0) -> None:
         """Mark the cells within `radius` of the points: where `roughness` counts."""
         mask = torch.zeros(self.shape, device=points.device)
@@ -127,9 +141,9 @@ class Grid(SDF):
         reach = max(1, round(radius / self.voxel))
         for axis in range(3):
             # A box dilation, one axis at a time.
-            mask = functional.max_pool1d(
-                mask.movedim(axis, -1).reshape(1, -1, self.shape[axis]), 2 * reach + 1, stride=1, padding=reach
-            ).reshape(mask.movedim(axis, -1).shape).movedim(-1, axis)
+            rows = mask.movedim(axis, -1)
+            wider = functional.max_pool1d(rows.reshape(1, -1, self.shape[axis]), 2 * reach + 1, 1, reach)
+            mask = wider.reshape(rows.shape).movedim(-1, axis)
         self.band[condition] = mask
 
     def roughness(self, generator: torch.Generator | None = None) -> Tensor:
@@ -146,3 +160,8 @@ class Grid(SDF):
             energy = energy + 2 * (inner * twist.square()).sum()
         # Second differences are h^2 times the derivatives; a cell has volume h^3.
         return energy / self.voxel
+
+
+def _finer(coefficients: Tensor) -> Tensor:
+    """Halve the cells of (b, 1, nx, ny, nz) coefficients; the spline stays the same function."""
+    return functional.interpolate(coefficients, scale_factor=2, mode="trilinear", align_corners=False)

@@ -1,6 +1,7 @@
 """The paper's network: fully connected layers with a bounded output (App. A)."""
 
 import math
+from itertools import pairwise
 
 import torch
 from torch import nn
@@ -37,7 +38,7 @@ class MLP(SDF):
             raise ValueError(f"output must be 'tanh' or 'linear', got {output!r}")
         self.code = ConditionCode(num_conditions)
         sizes = [3 + self.code.width] + [width] * layers
-        self.hidden = nn.ModuleList(nn.Linear(a, b) for a, b in zip(sizes[:-1], sizes[1:], strict=True))
+        self.hidden = nn.ModuleList(nn.Linear(a, b) for a, b in pairwise(sizes))
         self.head = nn.Linear(width, 1)
         self.output = output
         if geometric_init is not None:

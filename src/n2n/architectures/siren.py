@@ -1,6 +1,7 @@
 """A sinusoidal network: smooth derivatives of every order."""
 
 import math
+from itertools import pairwise
 
 import torch
 from torch import nn
@@ -28,7 +29,7 @@ class Siren(SDF):
         super().__init__()
         self.code = ConditionCode(num_conditions)
         sizes = [3 + self.code.width] + [width] * layers
-        self.hidden = nn.ModuleList(nn.Linear(a, b) for a, b in zip(sizes[:-1], sizes[1:], strict=True))
+        self.hidden = nn.ModuleList(nn.Linear(a, b) for a, b in pairwise(sizes))
         self.head = nn.Linear(width, 1)
         self.frequency, self.radius = frequency, radius
         for index, layer in enumerate(self.hidden):

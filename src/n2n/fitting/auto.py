@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 from n2n.config import AUTO
 from n2n.geometry.scale import Scales, estimate_scales
 
-
 _PROBED_POINTS = 20_000
 _NOISE_FLOOR = 0.05  # of the spacing: a clean cloud still has one length that limits what can be known
 _VOXEL = 0.33
-_STIFFNESS = 2.0
-_THIN_PLATE = 6.5e-3
+_STIFFNESS = 1.75
+_THIN_PLATE = 8e-3
 _BAND_VOXELS = 3.0
 _MAX_BATCH = 65_536
 _GRID_ITERATIONS, _GRID_RATE = 120, 0.02
@@ -70,7 +69,7 @@ class Chosen:
             "terms.smoothness.weight": _THIN_PLATE * self.noise * self.spacing / self.area * unit,
             "terms.scaffold.weight": unit,
             "terms.scaffold.normal_weight": stiffness,
-            "terms.far_field.weight": 5 * self.noise**2 * unit,
+            "terms.far_field.weight": 60 * self.noise**2 * unit,
         }
 
 

@@ -3,7 +3,7 @@
 import logging
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -66,12 +66,13 @@ def fit(
     seed = config["seed"]
     torch.manual_seed(seed)
     device = pick_device(config["device"])
-    chosen, guides = _prepare(data, config)
+    chosen, scaffolds = _prepare(data, config)
     config = _fill_config(config, chosen)
     field = build_field(config, len(data.shapes))
-    if config["scaffold"]:
-        for condition, clouds in enumerate(data.shapes):
-            field.set_band(torch.cat(clouds[:50]), chosen[condition].band, condition)
+    for condition, scaffold in enumerate(scaffolds):
+        field.start_from(_as_tensors(scaffold.distance), condition)
+        field.set_band(torch.cat(data.shapes[condition][:50]), chosen[condition].band, condition)
+    guides = [_guide(*parts, config["seed"]) for parts in zip(scaffolds, chosen, strict=False)]
     objective = build_objective(config, [_to_device(guide, device) for guide in guides])
     optimizer, scheduler = build_optimizer(config)
     iterations, plan_reuse = config["iterations"], config["plan_reuse"]
@@ -154,23 +155,25 @@ def quiet_lightning() -> Iterator[None]:
                 logger.setLevel(level)
 
 
-def _prepare(data: ObservationsDataModule, config: dict[str, Any]) -> tuple[list[Chosen], list[Guide]]:
-    """Measure every shape, and orient a scaffold of it where the recipe wants one."""
-    chosen, guides = [], []
+def _prepare(data: ObservationsDataModule, config: dict[str, Any]) -> tuple[list[Chosen], list[Scaffold]]:
+    """Measure every shape, and build a scaffold of it where the recipe wants one."""
+    chosen, scaffolds = [], []
     for clouds in data.shapes:
         arrays = [cloud.double().numpy() for cloud in clouds]
         scales, pool = measure(arrays, config["seed"])
-        choice = choose(scales, arrays)
-        chosen.append(choice)
+        chosen.append(choose(scales, arrays))
         if config["scaffold"]:
-            guides.append(_guide(pool, scales, choice, config["seed"]))
-    return chosen, guides
+            scaffolds.append(Scaffold.build(pool, scales, config["seed"]))
+    return chosen, scaffolds
 
 
-def _guide(pool: np.ndarray, scales: Any, choice: Chosen, seed: int) -> Guide:
-    scaffold = Scaffold.build(pool, scales, seed)
+def _guide(scaffold: Scaffold, choice: Chosen, seed: int) -> Guide:
     far, signs = scaffold.far_field(np.array(choice.lower), np.array(choice.upper), choice.margin, seed)
     return Guide(*(torch.as_tensor(x, dtype=torch.float32) for x in (scaffold.points, scaffold.normals, far, signs)))
+
+
+def _as_tensors(function: Callable[[np.ndarray], np.ndarray]) -> Callable[[torch.Tensor], torch.Tensor]:
+    return lambda points: torch.as_tensor(function(points.double().cpu().numpy()))
 
 
 def _fill_config(config: dict[str, Any], chosen: list[Chosen]) -> dict[str, Any]:
@@ -184,7 +187,7 @@ def _fill_config(config: dict[str, Any], chosen: list[Chosen]) -> dict[str, Any]
 
 
 def _to_device(guide: Guide, device: torch.device) -> Guide:
-    return Guide(guide.points.to(device), guide.normals.to(device), guide.far_points.to(device), guide.far_signs.to(device))
+    return Guide(*(part.to(device) for part in (guide.points, guide.normals, guide.far_points, guide.far_signs)))
 
 
 def _resume_from(run_dir: Path | None) -> Path | None:

@@ -9,6 +9,7 @@ from torch import Tensor
 from n2n.datamodules.observations import Draw
 from n2n.geometry.pull import pull
 from n2n.geometry.sampling import QuerySampler
+from n2n.losses.regularisers import nearest_distance
 from n2n.losses.state import FieldState, Guide
 
 _DENOISED_POINTS = 8192
@@ -63,7 +64,7 @@ class Objective:
             plan = self.distance.match(moved, targets)
             chosen = torch.randperm(len(draw.target), generator=generator)[:_DENOISED_POINTS].to(draw.target.device)
             denoised = self._pull(field, draw.target[chosen], draw.condition)
-        return Block(draw, queries, targets, plan, denoised, self._far(draw, denoised, generator))
+        return Block(draw, queries, targets, plan, denoised, self._far(draw, denoised))
 
     def loss(
         self, field: Any, block: Block, progress: float, generator: torch.Generator
@@ -85,7 +86,7 @@ class Objective:
             condition=condition,
             denoised=block.denoised,
             guide=self.guides[condition] if self.guides else None,
-            far=block.far,
+            far=_some(block.far, generator),
             progress=progress,
             generator=generator,
         )
@@ -100,13 +101,20 @@ class Objective:
         codes = torch.full((len(points),), condition, dtype=torch.long, device=points.device)
         return pull(points, *field.value_and_gradient(points, codes))
 
-    def _far(self, draw: Draw, denoised: Tensor, generator: torch.Generator) -> tuple[Tensor, Tensor] | None:
-        """Return some far points and their signed distance to the denoised set."""
+    def _far(self, draw: Draw, denoised: Tensor) -> tuple[Tensor, Tensor] | None:
+        """Return the guide's far points and their signed distance to the denoised set."""
         if not self.guides:
             return None
         guide = self.guides[draw.condition]
         if not len(guide.far_points):
             return None
-        chosen = torch.randint(len(guide.far_points), (_FAR_POINTS,), generator=generator).to(denoised.device)
-        points = guide.far_points[chosen]
-        return points, guide.far_signs[chosen] * torch.cdist(points, denoised).amin(dim=1)
+        return guide.far_points, guide.far_signs * nearest_distance(guide.far_points, denoised)
+
+
+def _some(far: tuple[Tensor, Tensor] | None, generator: torch.Generator) -> tuple[Tensor, Tensor] | None:
+    """Draw a few far points anew in every step: each is seen too seldom to be fitted alone."""
+    if far is None:
+        return None
+    points, distance = far
+    chosen = torch.randint(len(points), (_FAR_POINTS,), generator=generator).to(points.device)
+    return points[chosen], distance[chosen]

@@ -21,7 +21,7 @@ def read_npy(path: Path) -> Cloud:
 
 
 def read_npz(path: Path) -> Cloud:
-    """Read the array called points, pos, xyz, noisy or vertices, or the only (n, 3) one; arrays as long are attributes."""
+    """Read the array called points, pos, xyz, noisy or vertices, or the only (n, 3) one; the rest are attributes."""
     if path.read_bytes()[:2] != b"PK":
         raise InputError(f"{path}: is no .npz archive; check or re-save it with numpy.savez")
     with np.load(path, allow_pickle=False) as archive:

@@ -51,7 +51,9 @@ def check_writable(path: str | Path, extensions: Iterable[str]) -> None:
     if path.suffix.lower() not in extensions:
         known = ", ".join(extensions)
         hint = suggest(path.suffix.lower(), extensions).split(" Known")[0]
-        raise OutputError(f"{path}: cannot write files ending in {path.suffix or 'nothing'!r};{hint} choose one of: {known}")
+        raise OutputError(
+            f"{path}: cannot write files ending in {path.suffix or 'nothing'!r};{hint} choose one of: {known}"
+        )
     if path.is_dir():
         raise OutputError(f"{path}: is a folder; give a file name")
     if not path.parent.is_dir():

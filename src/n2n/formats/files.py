@@ -49,7 +49,7 @@ def read_cloud(path: str | Path) -> Cloud:
     if reader is None:
         hint = suggest(path.suffix.lower(), list(_READERS)).split(" Known")[0]
         raise InputError(
-            f"{path}: unknown file type {path.suffix or 'without extension'!r};{hint} readable are: {', '.join(_READERS)}"
+            f"{path}: unknown file type {path.suffix or 'without extension'!r};{hint} readable: {', '.join(_READERS)}"
         )
     try:
         if path.stat().st_size == 0:
@@ -61,7 +61,9 @@ def read_cloud(path: str | Path) -> Cloud:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
     except Exception as error:
         reason = " ".join(str(error).split())[:160] or type(error).__name__
-        raise InputError(f"{path}: is not a readable {path.suffix[1:]} file ({reason}); check or re-export it") from error
+        raise InputError(
+            f"{path}: is not a readable {path.suffix[1:]} file ({reason}); check or re-export it"
+        ) from error
     if not len(cloud):
         raise InputError(f"{path}: holds no points")
     return cloud
@@ -79,4 +81,3 @@ def write_cloud(path: str | Path, cloud: Cloud) -> None:
         raise OutputError(f"{path}: unknown file type {path.suffix!r}; choose one of: {', '.join(_WRITERS)}")
     with atomic_path(path) as temporary:
         writer(temporary, cloud)
-

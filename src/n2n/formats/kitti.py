@@ -12,8 +12,12 @@ def read(path: Path) -> Cloud:
     """Read a scan."""
     size = path.stat().st_size
     if size % 16:
-        raise InputError(f"{path}: {size} bytes are no whole number of 16-byte KITTI points (x y z reflectance, float32)")
+        raise InputError(
+            f"{path}: {size} bytes are no whole number of 16-byte KITTI points (x y z reflectance, float32)"
+        )
     rows = np.fromfile(path, "<f4").reshape(-1, 4)
     if not np.isfinite(rows[:, :3]).any() or np.nanmax(np.abs(rows[:, :3])) > 1e6:
-        raise InputError(f"{path}: the bytes are no KITTI points (coordinates beyond 1000 km); is it another kind of .bin?")
+        raise InputError(
+            f"{path}: the bytes are no KITTI points (coordinates beyond 1000 km); is it another kind of .bin?"
+        )
     return Cloud(rows[:, :3].astype(np.float64), {"reflectance": rows[:, 3].copy()})

@@ -25,7 +25,8 @@ def write(path: Path, cloud: Cloud) -> None:
 
     header = cloud.meta.get("las_header")
     if header is None:
-        header = laspy.LasHeader(point_format=7 if {"red", "green", "blue"} <= set(cloud.attributes) else 6, version="1.4")
+        coloured = {"red", "green", "blue"} <= set(cloud.attributes)
+        header = laspy.LasHeader(point_format=7 if coloured else 6, version="1.4")
     else:
         header = laspy.LasHeader(point_format=header.point_format, version=header.version)
         header.vlrs = cloud.meta["las_header"].vlrs

@@ -94,7 +94,8 @@ def _table(body: bytes, kind: str, dtype: np.dtype, points: int, path: Path) -> 
     elif kind != "binary":
         raise InputError(f"{path}: DATA {kind} is no PCD encoding; known: ascii, binary, binary_compressed")
     if len(body) < needed:
-        raise InputError(f"{path}: the header promises {points} points, the file holds {len(body) // dtype.itemsize}; it is cut off")
+        held = len(body) // dtype.itemsize
+        raise InputError(f"{path}: the header promises {points} points, the file holds {held}; it is cut off")
     if kind == "binary":
         return np.frombuffer(body[:needed], dtype)
     # Compressed files store field after field instead of point after point.

@@ -7,7 +7,16 @@ import numpy as np
 from n2n.errors import InputError
 from n2n.formats.cloud import Cloud
 
-_TYPES = {"f4": "float", "f8": "double", "i1": "char", "u1": "uchar", "i2": "short", "u2": "ushort", "i4": "int", "u4": "uint"}
+_TYPES = {
+    "f4": "float",
+    "f8": "double",
+    "i1": "char",
+    "u1": "uchar",
+    "i2": "short",
+    "u2": "ushort",
+    "i4": "int",
+    "u4": "uint",
+}
 
 
 def read(path: Path) -> Cloud:

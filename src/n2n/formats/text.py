@@ -18,7 +18,8 @@ def read(path: Path) -> Cloud:
         content = path.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(
-            f"{path}: is not text (byte {error.start} cannot be decoded); binary clouds end in .ply, .npy, .pcd, .las or .bin"
+            f"{path}: is not text (byte {error.start} cannot be decoded); "
+            "binary clouds end in .ply, .npy, .pcd, .las or .bin"
         ) from error
     if "\x00" in content:
         raise InputError(f"{path}: is binary, not text; binary clouds end in .ply, .npy, .pcd, .las or .bin")
@@ -65,7 +66,8 @@ def write(path: Path, cloud: Cloud) -> None:
         if wants_header:
             original = meta.get("names") or names
             file.write(delimiter.join(original if len(original) == width else names) + "\n")
-        np.savetxt(file, np.column_stack([np.asarray(c, np.float64) for c in columns]), fmt=formats, delimiter=delimiter)
+        table = np.column_stack([np.asarray(c, np.float64) for c in columns])
+        np.savetxt(file, table, fmt=formats, delimiter=delimiter)
 
 
 def _attribute_format(values: np.ndarray) -> str:

@@ -3,13 +3,14 @@
 For a closed surface with consistently oriented normals the field of surface dipoles is a gradient field: that of the
 indicator function, up to a sign. The energy of a Poisson reconstruction is therefore quadratic in the unknown signs s,
 
-    E(s) = s^T M s,    M_ij = a_i a_j (n_i . n_j - 3 (n_i . r)(n_j . r)) / |p_i - p_j|^3,    r the unit vector p_i - p_j,
+    E(s) = s^T M s,    M_ij = a_i a_j (n_i . n_j - 3 (n_i . r)(n_j . r)) / |p_i - p_j|^3,
 
+r being the unit vector along p_i - p_j,
 and largest for consistent signs: neighbours on a sheet attract equal signs, opposite sides of a thin wall opposite
 ones. No neighbour graph can leak, every pair counts.
 
-Source: the quadratic form is the screened-Poisson energy of Kazhdan and Hoppe 2013 without the screening; Metzer et al. 2021
-    propagate the same dipole field greedily. Differs: the energy itself is maximised, by chains of flips.
+Source: the quadratic form is the screened-Poisson energy of Kazhdan and Hoppe 2013 without the screening; Metzer et al.
+    2021 propagate the same dipole field greedily. Differs: the energy itself is maximised, by chains of flips.
 """
 
 import numpy as np
@@ -55,7 +56,7 @@ def orient(
 def dipole_energy(
     points: NDArray[np.float64], normals: NDArray[np.float64], areas: NDArray[np.float64], blur: float = 0.0
 ) -> Tensor:
-    """Return the symmetric coupling matrix M, (n, n) float32, regularised at the scale of the point spacing and blur."""
+    """Return the symmetric coupling matrix M, (n, n) float32, softened at the scale of point spacing and blur."""
     p, n, a = (torch.as_tensor(x, dtype=torch.float32) for x in (points, normals, areas))
     squared = torch.cdist(p, p).square() + float(a.median()) + blur**2
     own = (p * n).sum(1)

@@ -13,6 +13,7 @@ from n2n.geometry.scale import Scales
 _MAX_POINTS = 3000
 _AREA_NEIGHBOURS = 9
 _FAR_POSITIONS = 20_000
+_NEAR = 1.5  # sample spacings; closer than that a sample's plane says more than its distance
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,8 @@ class Scaffold:
         generator = np.random.default_rng(seed)
         tree = cKDTree(cloud)
         samples = cloud[_thin(cloud, _MAX_POINTS, generator)]
-        points, normals = project_to_quadric(tree, samples, max(2 * scales.patch if scales.patch < 48 else scales.patch, 32))
+        neighbours = max(2 * scales.patch if scales.patch < 48 else scales.patch, 32)
+        points, normals = project_to_quadric(tree, samples, neighbours)
         k = min(_AREA_NEIGHBOURS, len(points))
         reach = cKDTree(points).query(points, k)[0][:, -1]
         areas = np.pi * reach**2 / k
@@ -50,6 +52,14 @@ class Scaffold:
     def sign(self, queries: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return -1 where the winding number says inside and +1 elsewhere, (q,)."""
         return np.where(winding_number(queries, self.points, self.normals, self.areas) > 0.5, -1.0, 1.0)
+
+    def distance(self, queries: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return approximate signed distances (q,): to the plane of the nearest sample, or far off to the sample."""
+        reach, nearest = cKDTree(self.points).query(queries)
+        far = reach > _NEAR * np.sqrt(self.areas[nearest])
+        result = np.einsum("qi,qi->q", queries - self.points[nearest], self.normals[nearest])
+        result[far] = reach[far] * self.sign(queries[far])
+        return result
 
     def far_field(
         self, lower: NDArray[np.float64], upper: NDArray[np.float64], margin: float, seed: int = 0

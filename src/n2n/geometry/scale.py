@@ -55,8 +55,8 @@ def estimate_scales(points: NDArray[np.float64], seed: int = 0) -> Scales:
         width = float(np.median(radius))
         ratio = width / max(noise, 1e-12)
         if ratio > best_ratio:
-            # Area per point from the smallest disc that holds k points: flat, so free of the noise's thickness.
-            spacing = np.sqrt(np.pi * np.median(distance[:, -1]) ** 2 / k)
+            # Area per point from the smallest disc that holds the k - 1 points around each probe.
+            spacing = np.sqrt(np.pi * np.median(distance[:, -1]) ** 2 / (k - 1))
             best, best_ratio = (noise, float(spacing), k), ratio
         if ratio >= _PATCH_TO_NOISE:
             break

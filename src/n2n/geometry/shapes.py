@@ -88,5 +88,5 @@ def scan(shape: str, count: int, noise: float, seed: int = 0) -> NDArray[np.floa
 
 def _gradient(distance: _Distance, points: NDArray[np.float64], shell: float) -> NDArray[np.float64]:
     step = 1e-3 * shell
-    slope = np.stack([distance(points + step * e) - distance(points - step * e) for e in np.eye(3)], axis=1) / (2 * step)
+    slope = np.stack([distance(points + step * e) - distance(points - step * e) for e in np.eye(3)], axis=1)
     return slope / np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-12)

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from n2n.formats.atomic import atomic_path
-from n2n.report.raster import Camera, Canvas
+from n2n.report.camera import Camera
+from n2n.report.scene import Layer, Spheres, Surface, render
 
 if TYPE_CHECKING:
     import trimesh
@@ -16,7 +17,9 @@ _NOISY = np.array([0.80, 0.36, 0.22])
 _CLEAN = np.array([0.16, 0.42, 0.66])
 _SURFACE = np.array([0.66, 0.74, 0.82])
 _SIZE = 720
+_WITH_LABEL = 1.07  # height of a panel with its label / without
 _MAX_POINTS = 200_000
+_BALL = 0.32  # radius of a point's ball; times the picture's extent / sqrt(points)
 
 
 def draw_preview(
@@ -45,18 +48,15 @@ def draw_preview(
         f"denoised: {0 if after is None else len(after):,} points",
         f"surface: {0 if mesh is None else len(mesh.faces):,} triangles",
     )
-    panels = []
+    panels: list[tuple[Layer, str]] = []
     for points, colour, label in ((before, _NOISY, labels[0]), (after, _CLEAN, labels[1])):
         if points is not None:
-            canvas = Canvas(size, camera)
             shown = points[:: -(-len(points) // _MAX_POINTS)]
-            canvas.points(shown, colour, radius=float(np.clip(180 / np.sqrt(len(shown)), 0.6, 2.4)))
-            panels.append((canvas.image(), label))
+            radius = _BALL * max(camera.extent) / np.sqrt(len(shown))
+            panels.append((Spheres(shown, colour, radius), label))
     if mesh is not None:
-        canvas = Canvas(size, camera)
-        canvas.mesh(vertices, np.asarray(mesh.faces), _SURFACE)
-        panels.append((canvas.image(), labels[2]))
-    _save(path, panels)
+        panels.append((Surface(vertices, np.asarray(mesh.faces), _SURFACE), labels[2]))
+    _save(path, [(render([layer], camera, size), label) for layer, label in panels])
 
 
 def _up_axis(points: NDArray[np.float64]) -> int:
@@ -70,11 +70,11 @@ def _save(path: Path, panels: list[tuple[NDArray[np.uint8], str]]) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    size = panels[0][0].shape[0]
-    figure = Figure(figsize=(size * len(panels) / 100, size * 1.07 / 100), dpi=100, facecolor="white")
+    height, width = panels[0][0].shape[:2]
+    figure = Figure(figsize=(width * len(panels) / 100, height * _WITH_LABEL / 100), dpi=100, facecolor="white")
     FigureCanvasAgg(figure)
     for index, (image, label) in enumerate(panels):
-        axes = figure.add_axes((index / len(panels), 0.0, 1 / len(panels), 1 / 1.07))
+        axes = figure.add_axes((index / len(panels), 0.0, 1 / len(panels), 1 / _WITH_LABEL))
         axes.imshow(image, interpolation="none")
         axes.axis("off")
         figure.text((index + 0.5) / len(panels), 0.965, label, ha="center", va="center", fontsize=13, color="#333333")

@@ -20,7 +20,7 @@ _CREASE_DEPTH = 0.30
 
 
 def shade(seen: Seen, shadow: NDArray[np.bool_] | None = None) -> NDArray[np.float32]:
-    """Return the lit picture (h, w, 3), 0 to 1, white background; `shadow` (h, w) is the part of the ground in the dark."""
+    """Return the lit picture (h, w, 3), 0 to 1, on white; `shadow` (h, w) is the part of the ground in the dark."""
     image = np.ones_like(seen.colour)
     if shadow is not None:
         soft = _blur(shadow.astype(np.float32), 0.012 * max(shadow.shape))

@@ -63,7 +63,9 @@ class Field:
         """Pull (n, 3) noisy points onto the surface; number and order are kept."""
         return denoise_points(self.sdf, self.frames[shape], _points(points), shape)
 
-    def upsample(self, points: NDArray[np.float64], rate: int = 4, seed: int = 0, shape: int = 0) -> NDArray[np.float64]:
+    def upsample(
+        self, points: NDArray[np.float64], rate: int = 4, seed: int = 0, shape: int = 0
+    ) -> NDArray[np.float64]:
         """Return (rate * n, 3) points on the surface: the n denoised points, then rate - 1 perturbed copies, pulled."""
         return upsample_points(self.sdf, self.frames[shape], _points(points), rate, seed, shape)
 
@@ -113,7 +115,9 @@ class Field:
             sdf = build_field(state["config"], len(frames))
             sdf.load_state_dict(state["weights"])
         except (RuntimeError, KeyError, EOFError, ValueError, TypeError) as error:
-            raise InputError(f"{path} cannot be read as an n2n field ({str(error).splitlines()[0]}); fit again") from error
+            raise InputError(
+                f"{path} cannot be read as an n2n field ({str(error).splitlines()[0]}); fit again"
+            ) from error
         return cls(sdf.eval().to(pick_device(device)), frames, state["config"], state["report"])
 
 

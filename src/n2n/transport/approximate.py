@@ -16,8 +16,8 @@ def approximate_plan(source: Leaves, target: Leaves) -> Coupling:
     Returns:
         Plan (b, k, k) with row and column sums of at most 1 / k.
 
-    Source: the `approxmatch` operator of Fan et al. 2017 (Point Set Generation Network), used by the script released with
-        Ma et al. 2023. The kernel widths are absolute: they assume coordinates of unit size.
+    Source: the `approxmatch` operator of Fan et al. 2017 (Point Set Generation Network), used by the script released
+        with Ma et al. 2023. The kernel widths are absolute: they assume coordinates of unit size.
     """
     squared = matching_cost(source, target, 2)
     count = squared.shape[-1]

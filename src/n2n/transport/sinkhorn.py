@@ -9,9 +9,7 @@ from n2n.transport.assignment import matching_cost
 
 
 @torch.no_grad()
-def sinkhorn_plan(
-    source: Leaves, target: Leaves, epsilon: float = 0.01, iterations: int = 100, p: int = 1
-) -> Coupling:
+def sinkhorn_plan(source: Leaves, target: Leaves, epsilon: float = 0.01, iterations: int = 100, p: int = 1) -> Coupling:
     """Return the entropic transport plan of each leaf, computed in the log domain.
 
     Args:
