@@ -58,7 +58,7 @@ class Config:
     batch_size: Any = AUTO
     num_observations: int | None = None
     regulariser_weight: float = 0.0
-    plan_reuse: int = 1
+    plan_reuse: Any = 1
     pairs: str = "random"
     scaffold: bool = False
     checkpoint_every: int = 1000

@@ -180,7 +180,7 @@ def example_state(seed: int = 0, complete: bool = True) -> FieldState:
         pulled=pull(queries, value, gradient),
         targets=targets,
         denoised=0.5 * sphere if complete else None,
-        guide=Guide(0.5 * sphere, sphere, far, distance.sign()) if complete else None,
+        guide=Guide(0.5 * sphere, sphere, far, distance.sign(), torch.pi) if complete else None,
         far=(far, distance) if complete else None,
         generator=generator,
     )

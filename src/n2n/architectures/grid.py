@@ -1,7 +1,7 @@
 """A multi-resolution grid of quadratic B-splines: linear in its parameters, value and gradient in closed form."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 import torch
@@ -33,8 +33,8 @@ class Grid(SDF):
     def __init__(
         self,
         voxel: float,
-        lower: tuple[float, float, float] = (-1.2, -1.2, -1.2),
-        upper: tuple[float, float, float] = (1.2, 1.2, 1.2),
+        lower: Sequence[float] = (-1.2, -1.2, -1.2),
+        upper: Sequence[float] = (1.2, 1.2, 1.2),
         levels: int = 4,
         radius: float = 0.5,
         num_conditions: int = 1,
@@ -122,7 +122,7 @@ class Grid(SDF):
         """Set all levels but the finest to a distance: the spline coefficients of a smooth function are its values."""
         with torch.no_grad():
             total = torch.zeros_like(self.levels[0][condition : condition + 1])
-            for level in self.levels[:-1]:
+            for level in self.levels[: max(1, len(self.levels) - 1)]:
                 cells = level.shape[2:]
                 if total.shape[2:] != cells:
                     total = _finer(total)

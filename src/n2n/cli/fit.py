@@ -54,9 +54,6 @@ def run_fit(arguments: list[str]) -> int:
     except KeyboardInterrupt as stop:
         raise KeyboardInterrupt(_RESUMES) from stop
     except SystemExit as stop:
-        # Lightning turns Ctrl-C into an exit of its own.
-        if isinstance(stop.__context__, KeyboardInterrupt):
-            raise KeyboardInterrupt(_RESUMES) from stop
         return 2 if stop.code else 0
     finally:
         sys.argv = previous

@@ -26,11 +26,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _fail("not enough memory; use fewer points, a lower --resolution or a smaller batch_size")
     except KeyboardInterrupt as stop:
         return _interrupted(str(stop))
-    except SystemExit as stop:
-        # Lightning turns Ctrl-C into an exit of its own.
-        if isinstance(stop.__context__, KeyboardInterrupt):
-            return _interrupted()
-        raise
     except BrokenPipeError:
         # The reader of our output has gone (n2n list | head); the interpreter would complain once more at exit.
         sys.stdout = None

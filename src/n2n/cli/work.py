@@ -3,6 +3,7 @@
 import argparse
 import time
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -112,13 +113,7 @@ def _fit(options: argparse.Namespace, inputs: list[Input], config: dict[str, Any
 def _reconstruct(field: "Field", options: argparse.Namespace, inputs: list[Input], outputs: list[Path]) -> str:
     with progress_bar("extracting the surface", options.quiet):
         mesh = field.reconstruct(options.resolution, options.edge, options.shape)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        make_folder(outputs[0].parent)
-        write_mesh(outputs[0], mesh)
-    for warning in caught:
-        if issubclass(warning.category, UserWarning):
-            say(str(warning.message), options.quiet)
+    _write(write_mesh, outputs[0], mesh, options.quiet)
     if options.preview:
         before = inputs[0].points if inputs else None
         _preview(options.preview, before, None if before is None else field.denoise(before, options.shape), mesh)
@@ -132,13 +127,23 @@ def _move(field: "Field", options: argparse.Namespace, inputs: list[Input], outp
     # A file takes the first input's result only; zip stops there.
     for output, item in zip(outputs, inputs, strict=False):
         results.append(move(field, item, options))
-        make_folder(output.parent)
-        write_cloud(output, results[-1])
+        _write(write_cloud, output, results[-1], options.quiet)
     if options.preview:
         after = results[0].points
         _preview(options.preview, inputs[0].points, after[np.isfinite(after).all(axis=1)], None)
     files = f" in {len(results)} files" if len(results) > 1 else ""
     return f"{sum(map(len, results)):,} points{files}"
+
+
+def _write(write: Callable[[Path, Any], None], path: Path, result: Any, quiet: bool) -> None:
+    """Write a result into a folder that may not exist yet; tell what its format cannot hold."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        make_folder(path.parent)
+        write(path, result)
+    for warning in caught:
+        if issubclass(warning.category, UserWarning):
+            say(str(warning.message), quiet)
 
 
 def _denoised(field: "Field", item: Input, options: argparse.Namespace) -> Cloud:

@@ -59,7 +59,7 @@ class ObservationsDataModule(L.LightningDataModule):
             frame = Frame.fit(used)
             self.frames.append(frame)
             self.shapes.append([torch.as_tensor(frame.to_unit(c), dtype=torch.float32) for c in used])
-        self._blocks: dict[str, Any] = {"pairs": "random", "points": None, "seed": 0, "first": 0}
+        self._blocks: dict[str, Any] = {"pairs": "random", "points": 1, "seed": 0}
 
     def configure_draws(self, pairs: str, points: int, seed: int, first: int = 0, step: int = 1) -> None:
         """Say how pairs are drawn.
@@ -100,7 +100,7 @@ class _Draws(IterableDataset):
         random = np.random.default_rng([self.seed, iteration])
         condition = int(random.integers(len(self.shapes)))
         clouds = self.shapes[condition]
-        count = min(len(clouds), max(1, -(-self.points // max(len(clouds[0]), 1))))
+        count = min(len(clouds), max(1, -(-self.points // min(map(len, clouds)))))
         first = random.choice(len(clouds), count, replace=False)
         second = first if self.pairs == "same" or len(clouds) == 1 else random.choice(len(clouds), count, replace=False)
         same = bool((first == second).all())

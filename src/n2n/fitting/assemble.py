@@ -18,7 +18,7 @@ def build_field(config: dict[str, Any], num_conditions: int) -> SDF:
     return _checked(ARCHITECTURES.build, config["architecture"], num_conditions=num_conditions)
 
 
-def build_objective(config: dict[str, Any], guides: list[Guide]) -> Objective:
+def build_objective(config: dict[str, Any], guides: list[Guide | None]) -> Objective:
     """Build Eq. 7: distance, pairing, queries, lambda R and the further terms."""
     terms = {"regulariser": (config["regulariser_weight"], _checked(REGULARISERS.build, config["regulariser"]))}
     for key, spec in config["terms"].items():

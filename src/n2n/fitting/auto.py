@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from n2n.config import AUTO
+from n2n.errors import ConfigError
+from n2n.fitting.objective import DENOISED_POINTS
 from n2n.geometry.scale import Scales, estimate_scales
 
 _PROBED_POINTS = 20_000
@@ -20,8 +22,9 @@ _VOXEL = 0.33
 _STIFFNESS = 1.75
 _THIN_PLATE = 8e-3
 _BAND_VOXELS = 3.0
-_MAX_BATCH = 65_536
-_GRID_ITERATIONS, _GRID_RATE = 120, 0.02
+_MAX_BATCH = 32_768
+_PLAN_REUSE = 20
+_GRID_ITERATIONS, _GRID_RATE = 160, 0.02
 _NETWORK_ITERATIONS, _NETWORK_RATE = 2000, 5e-4
 
 
@@ -36,8 +39,9 @@ class Chosen:
         lower, upper: Box of the field.
         voxel: Finest cell of the grid.
         band: Half width of the zone around the data where smoothness is asked for.
-        margin: Distance beyond which the sign of the scaffold is trusted.
+        margin: Distance from the points beyond which sign and distance of the scaffold are trusted.
         batch_size: Points matched at once.
+        plan_reuse: Optimiser steps per matching: fewer where one batch does not hold all points.
         observations: N.
     """
 
@@ -50,6 +54,7 @@ class Chosen:
     band: float
     margin: float
     batch_size: int
+    plan_reuse: int
     observations: int
 
     def values(self, config: dict[str, Any]) -> dict[str, Any]:
@@ -62,6 +67,7 @@ class Chosen:
             "iterations": _GRID_ITERATIONS if linear else _NETWORK_ITERATIONS,
             "optimizer.lr": _GRID_RATE if linear else _NETWORK_RATE,
             "batch_size": self.batch_size,
+            "plan_reuse": self.plan_reuse,
             "queries.kind": "neighbour" if self.observations == 1 else "observation",
             "queries.scale": 0.5 * self.noise,
             "architecture.voxel": self.voxel,
@@ -98,6 +104,8 @@ def choose(scales: Scales, observations: list[NDArray[np.float64]]) -> Chosen:
     noise = max(scales.noise, _NOISE_FLOOR * scales.spacing)
     voxel = _VOXEL * (noise * scales.spacing) ** 0.25
     pad = max(0.12, 4 * noise)
+    total = sum(map(len, observations))
+    sampled = min(DENOISED_POINTS, max(map(len, observations)))
     lower = np.min([points.min(axis=0) for points in observations], axis=0) - pad
     upper = np.max([points.max(axis=0) for points in observations], axis=0) + pad
     return Chosen(
@@ -108,14 +116,23 @@ def choose(scales: Scales, observations: list[NDArray[np.float64]]) -> Chosen:
         upper=tuple(float(x) for x in upper),
         voxel=voxel,
         band=_BAND_VOXELS * voxel,
-        margin=max(3 * noise, 2 * voxel),
-        batch_size=min(max(map(len, observations)), _MAX_BATCH),
+        margin=max(3 * noise, 2 * voxel, 2 * float(np.sqrt(scales.area / sampled))),
+        batch_size=min(total, _MAX_BATCH),
+        plan_reuse=int(np.clip(_PLAN_REUSE * _MAX_BATCH // total, 4, _PLAN_REUSE)),
         observations=len(observations),
     )
 
 
 def fill(config: Any, values: dict[str, Any], path: str = "") -> Any:
-    """Return a copy of nested dicts with every `auto` replaced by the value of its dotted name."""
+    """Return a copy of nested dicts with every `auto` replaced by the value of its dotted name.
+
+    Raises:
+        ConfigError: An `auto` without a value.
+    """
     if isinstance(config, dict):
         return {key: fill(item, values, f"{path}.{key}" if path else str(key)) for key, item in config.items()}
-    return values.get(path, config) if config == AUTO else config
+    if config != AUTO:
+        return config
+    if path not in values:
+        raise ConfigError(f"{path}=auto: nothing in the data tells its value; give a number")
+    return values[path]

@@ -3,14 +3,13 @@
 import logging
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import lightning as L
-import numpy as np
 import torch
 from lightning.pytorch.callbacks import ModelCheckpoint
 
@@ -19,12 +18,10 @@ from n2n.config import AUTO
 from n2n.datamodules.observations import ObservationsDataModule
 from n2n.errors import ConfigError
 from n2n.fitting.assemble import build_field, build_objective, build_optimizer
-from n2n.fitting.auto import Chosen, choose, fill, measure
 from n2n.fitting.callbacks import ProgressReport, Report
 from n2n.fitting.module import FitModule
+from n2n.fitting.prepare import fill_config, prepare
 from n2n.geometry.frame import Frame
-from n2n.geometry.scaffold import Scaffold
-from n2n.losses.state import Guide
 
 LAST_CHECKPOINT = "last.ckpt"
 
@@ -66,14 +63,12 @@ def fit(
     seed = config["seed"]
     torch.manual_seed(seed)
     device = pick_device(config["device"])
-    chosen, scaffolds = _prepare(data, config)
-    config = _fill_config(config, chosen)
-    field = build_field(config, len(data.shapes))
-    for condition, scaffold in enumerate(scaffolds):
-        field.start_from(_as_tensors(scaffold.distance), condition)
-        field.set_band(torch.cat(data.shapes[condition][:50]), chosen[condition].band, condition)
-    guides = [_guide(*parts, config["seed"]) for parts in zip(scaffolds, chosen, strict=False)]
-    objective = build_objective(config, [_to_device(guide, device) for guide in guides])
+    shapes = prepare(data, config)
+    config = fill_config(config, shapes, device)
+    field = build_field(config, len(shapes))
+    for condition, shape in enumerate(shapes):
+        shape.start(field, condition)
+    objective = build_objective(config, [shape.guide(device, seed) for shape in shapes])
     optimizer, scheduler = build_optimizer(config)
     iterations, plan_reuse = config["iterations"], config["plan_reuse"]
     module = FitModule(field, objective, optimizer, scheduler, iterations, plan_reuse, seed)
@@ -105,7 +100,9 @@ def fit(
             num_sanity_val_steps=0,
         )
         if first < iterations:
-            trainer.fit(module, data, ckpt_path=resume, weights_only=True if resume else None)
+            _train(trainer, module, data, resume)
+        else:
+            module.load_state_dict(torch.load(resume, weights_only=True, map_location="cpu")["state_dict"])
     field = module.field.eval().to(device)
     return FitResult(
         field=field,
@@ -117,8 +114,8 @@ def fit(
             "device": str(device),
             "points": [sum(len(c) for c in clouds) for clouds in data.shapes],
             "observations": [len(clouds) for clouds in data.shapes],
-            "noise": [c.noise * f.scale for c, f in zip(chosen, data.frames, strict=True)],
-            "spacing": [c.spacing * f.scale for c, f in zip(chosen, data.frames, strict=True)],
+            "noise": [s.chosen.noise * f.scale for s, f in zip(shapes, data.frames, strict=True)],
+            "spacing": [s.chosen.spacing * f.scale for s, f in zip(shapes, data.frames, strict=True)],
             "losses": {name: float(value) for name, value in trainer.callback_metrics.items()},
             "seconds_prepare": round(prepared - start, 2),
             "seconds_fit": round(time.perf_counter() - prepared, 2),
@@ -155,39 +152,14 @@ def quiet_lightning() -> Iterator[None]:
                 logger.setLevel(level)
 
 
-def _prepare(data: ObservationsDataModule, config: dict[str, Any]) -> tuple[list[Chosen], list[Scaffold]]:
-    """Measure every shape, and build a scaffold of it where the recipe wants one."""
-    chosen, scaffolds = [], []
-    for clouds in data.shapes:
-        arrays = [cloud.double().numpy() for cloud in clouds]
-        scales, pool = measure(arrays, config["seed"])
-        chosen.append(choose(scales, arrays))
-        if config["scaffold"]:
-            scaffolds.append(Scaffold.build(pool, scales, config["seed"]))
-    return chosen, scaffolds
-
-
-def _guide(scaffold: Scaffold, choice: Chosen, seed: int) -> Guide:
-    far, signs = scaffold.far_field(np.array(choice.lower), np.array(choice.upper), choice.margin, seed)
-    return Guide(*(torch.as_tensor(x, dtype=torch.float32) for x in (scaffold.points, scaffold.normals, far, signs)))
-
-
-def _as_tensors(function: Callable[[np.ndarray], np.ndarray]) -> Callable[[torch.Tensor], torch.Tensor]:
-    return lambda points: torch.as_tensor(function(points.double().cpu().numpy()))
-
-
-def _fill_config(config: dict[str, Any], chosen: list[Chosen]) -> dict[str, Any]:
-    """Replace every `auto`; shapes that share one network share the finest choice."""
-    finest = min(chosen, key=lambda choice: choice.voxel)
-    box = {
-        "architecture.lower": [min(c.lower[a] for c in chosen) for a in range(3)],
-        "architecture.upper": [max(c.upper[a] for c in chosen) for a in range(3)],
-    }
-    return fill(config, {**finest.values(config), **box})
-
-
-def _to_device(guide: Guide, device: torch.device) -> Guide:
-    return Guide(*(part.to(device) for part in (guide.points, guide.normals, guide.far_points, guide.far_signs)))
+def _train(trainer: L.Trainer, module: FitModule, data: ObservationsDataModule, resume: Path | None) -> None:
+    try:
+        trainer.fit(module, data, ckpt_path=resume, weights_only=True if resume else None)
+    except SystemExit as stop:
+        # Lightning turns Ctrl-C into an exit, which would end a notebook.
+        if isinstance(stop.__context__, KeyboardInterrupt):
+            raise KeyboardInterrupt from stop
+        raise
 
 
 def _resume_from(run_dir: Path | None) -> Path | None:

@@ -1,19 +1,22 @@
 """Eq. 7 as an object: draw queries and targets, match them, measure L + lambda R + further terms."""
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import torch
 from torch import Tensor
+from torch.nn import functional
 
 from n2n.datamodules.observations import Draw
 from n2n.geometry.pull import pull
 from n2n.geometry.sampling import QuerySampler
-from n2n.losses.regularisers import nearest_distance
 from n2n.losses.state import FieldState, Guide
 
-_DENOISED_POINTS = 8192
+DENOISED_POINTS = 8192
 _FAR_POINTS = 2048
+_CHUNK = 4096
 
 
 @dataclass
@@ -36,7 +39,7 @@ class Objective:
         pairing: Which subsets are matched.
         queries: Where the field is asked.
         terms: name -> (weight, term); holds lambda R under `regulariser`.
-        guides: Per shape, or empty.
+        guides: One per shape, None where there is none; or empty.
     """
 
     def __init__(
@@ -45,11 +48,11 @@ class Objective:
         pairing: Any,
         queries: QuerySampler,
         terms: dict[str, tuple[float, Any]],
-        guides: list[Guide] | None = None,
+        guides: Sequence[Guide | None] = (),
     ) -> None:
         self.distance, self.pairing, self.queries = distance, pairing, queries
         self.terms = {name: (weight, term) for name, (weight, term) in terms.items() if weight}
-        self.guides = guides or []
+        self.guides = guides
 
     @torch.no_grad()
     def begin(self, field: Any, draw: Draw, generator: torch.Generator) -> Block:
@@ -62,9 +65,10 @@ class Objective:
         with field.shared():
             moved = self._pull(field, queries.reshape(-1, 3), draw.condition).reshape(queries.shape)
             plan = self.distance.match(moved, targets)
-            chosen = torch.randperm(len(draw.target), generator=generator)[:_DENOISED_POINTS].to(draw.target.device)
+            chosen = torch.randperm(len(draw.target), generator=generator)[:DENOISED_POINTS].to(draw.target.device)
             denoised = self._pull(field, draw.target[chosen], draw.condition)
-        return Block(draw, queries, targets, plan, denoised, self._far(draw, denoised))
+            far = self._far(draw, denoised, field)
+        return Block(draw, queries, targets, plan, denoised, far)
 
     def loss(
         self, field: Any, block: Block, progress: float, generator: torch.Generator
@@ -85,7 +89,7 @@ class Objective:
             targets=block.targets.reshape(-1, 3),
             condition=condition,
             denoised=block.denoised,
-            guide=self.guides[condition] if self.guides else None,
+            guide=self._guide(condition),
             far=_some(block.far, generator),
             progress=progress,
             generator=generator,
@@ -98,17 +102,39 @@ class Objective:
         return total, parts
 
     def _pull(self, field: Any, points: Tensor, condition: int) -> Tensor:
-        codes = torch.full((len(points),), condition, dtype=torch.long, device=points.device)
-        return pull(points, *field.value_and_gradient(points, codes))
+        return pull(points, *self._evaluate(field, points, condition))
 
-    def _far(self, draw: Draw, denoised: Tensor) -> tuple[Tensor, Tensor] | None:
-        """Return the guide's far points and their signed distance to the denoised set."""
-        if not self.guides:
+    def _evaluate(self, field: Any, points: Tensor, condition: int) -> tuple[Tensor, Tensor]:
+        codes = torch.full((len(points),), condition, dtype=torch.long, device=points.device)
+        return field.value_and_gradient(points, codes)
+
+    def _guide(self, condition: int) -> Guide | None:
+        return self.guides[condition] if self.guides else None
+
+    def _far(self, draw: Draw, denoised: Tensor, field: Any) -> tuple[Tensor, Tensor] | None:
+        """Return the guide's far points and their signed distance to the surface that the denoised set samples."""
+        guide = self._guide(draw.condition)
+        if guide is None or not len(guide.far_points):
             return None
-        guide = self.guides[draw.condition]
-        if not len(guide.far_points):
-            return None
-        return guide.far_points, guide.far_signs * nearest_distance(guide.far_points, denoised)
+        normals = functional.normalize(self._evaluate(field, denoised, draw.condition)[1], dim=-1)
+        distance = sheet_distance(guide.far_points, denoised, normals, math.sqrt(guide.area / len(denoised)))
+        return guide.far_points, guide.far_signs * distance
+
+
+def sheet_distance(points: Tensor, samples: Tensor, normals: Tensor, spacing: float) -> Tensor:
+    """Return the unsigned distance of points (m, 3) to a surface known by samples (n, 3) and normals (n, 3).
+
+    The nearest sample is not the nearest point of the surface: that is up to a spacing aside. The distance to the
+    sample alone is too large between samples, and would press the field into every gap of the cloud.
+    """
+    distance = torch.empty(len(points), device=points.device)
+    for start in range(0, len(points), _CHUNK):
+        part = slice(start, start + _CHUNK)
+        reach, index = torch.cdist(points[part], samples).min(dim=1)
+        along = ((points[part] - samples[index]) * normals[index]).sum(-1)
+        aside = (reach.square() - along.square()).clamp(0, spacing**2)
+        distance[part] = (reach.square() - aside).sqrt()
+    return distance
 
 
 def _some(far: tuple[Tensor, Tensor] | None, generator: torch.Generator) -> tuple[Tensor, Tensor] | None:

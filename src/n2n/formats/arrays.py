@@ -1,5 +1,6 @@
 """NumPy arrays: .npy with (n, >= 3) columns, .npz with a points array and further arrays per point."""
 
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -22,8 +23,8 @@ def read_npy(path: Path) -> Cloud:
 
 def read_npz(path: Path) -> Cloud:
     """Read the array called points, pos, xyz, noisy or vertices, or the only (n, 3) one; the rest are attributes."""
-    if path.read_bytes()[:2] != b"PK":
-        raise InputError(f"{path}: is no .npz archive; check or re-save it with numpy.savez")
+    if not zipfile.is_zipfile(path):
+        raise InputError(f"{path}: is no .npz archive, or cut off; check or re-save it with numpy.savez")
     with np.load(path, allow_pickle=False) as archive:
         arrays = {name: archive[name] for name in archive.files}
     fitting = [name for name, a in arrays.items() if a.ndim == 2 and a.shape[1] == 3]
@@ -41,9 +42,8 @@ def read_npz(path: Path) -> Cloud:
 
 def write_npy(path: Path, cloud: Cloud) -> None:
     """Write (n, 3 + attribute columns) float64."""
-    columns = [np.asarray(values, np.float64).reshape(len(cloud), -1) for values in cloud.attributes.values()]
     with path.open("wb") as file:
-        np.save(file, np.concatenate([cloud.points, *columns], axis=1))
+        np.save(file, np.column_stack([cloud.points, *cloud.columns().values()]).astype(np.float64))
 
 
 def write_npz(path: Path, cloud: Cloud) -> None:

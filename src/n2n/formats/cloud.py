@@ -29,12 +29,17 @@ class Cloud:
         return np.isfinite(self.points).all(axis=1)
 
     def columns(self) -> dict[str, NDArray[Any]]:
-        """Return the attributes as (n,) columns, (n, k) arrays split into name_0 ... name_(k-1)."""
+        """Return the attributes as (n,) columns of numbers, (n, k) arrays split into name_0 ... name_(k-1).
+
+        Texts and dates are left out: only .npz holds them. An attribute called like a coordinate gets an underscore.
+        """
         flat = {}
         for name, values in self.attributes.items():
             values = np.asarray(values)
+            if values.dtype.kind not in "biuf":
+                continue
             if values.ndim == 1:
-                flat[name] = values
+                flat[f"{name}_" if name.lower() in ("x", "y", "z") else name] = values
             else:
                 flat.update({f"{name}_{i}": values[:, i] for i in range(values.shape[1])})
         return flat

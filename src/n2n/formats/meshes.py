@@ -28,6 +28,8 @@ def read_vertices(path: Path) -> Cloud:
     if path.suffix.lower() == ".obj":
         return Cloud(_obj_vertices(path))
     mesh = trimesh.load(path, process=False, force="mesh")
+    if not len(mesh.vertices):
+        raise InputError(f"{path}: holds no triangles, is cut off or is no STL file; check or re-export it")
     return Cloud(np.unique(np.asarray(mesh.vertices, np.float64), axis=0))
 
 
@@ -44,14 +46,21 @@ def _off_vertices(path: Path) -> np.ndarray:
     count = int(header[0])
     if len(body) < count:
         raise InputError(f"{path}: the header promises {count} vertices, the file holds {len(body)}; it is cut off")
-    return np.array([row[:3] for row in body[:count]], np.float64).reshape(-1, 3)
+    return _positions(body[:count], path)
 
 
 def _obj_vertices(path: Path) -> np.ndarray:
-    lines = [line.split()[1:4] for line in path.read_text(errors="replace").splitlines() if line.startswith("v ")]
-    if not lines:
+    words = (line.split() for line in path.read_text(errors="replace").splitlines())
+    rows = [row[1:] for row in words if row and row[0] == "v"]
+    if not rows:
         raise InputError(f"{path}: holds no vertices (no line starts with 'v ')")
-    return np.array(lines, np.float64)
+    return _positions(rows, path)
+
+
+def _positions(rows: list[list[str]], path: Path) -> np.ndarray:
+    if any(len(row) < 3 for row in rows):
+        raise InputError(f"{path}: has vertices of fewer than three coordinates; check or re-export it")
+    return np.array([row[:3] for row in rows], np.float64).reshape(-1, 3)
 
 
 def write_mesh(path: str | Path, mesh: "trimesh.Trimesh") -> None:

@@ -16,10 +16,12 @@ def read(path: Path) -> Cloud:
     """Read x y z and every further one-element field."""
     content = path.read_bytes()
     fields, start = _header(content, path)
+    # Padding is called _, any number of times.
+    names = [f"_{i}" if name == "_" else name for i, name in enumerate(fields["FIELDS"])]
     dtype = np.dtype(
         [
             (name, f"<{_KINDS[kind]}{size}", () if count == 1 else (count,))
-            for name, size, kind, count in zip(*(fields[k] for k in ("FIELDS", "SIZE", "TYPE", "COUNT")), strict=True)
+            for name, size, kind, count in zip(names, *(fields[k] for k in ("SIZE", "TYPE", "COUNT")), strict=True)
         ]
     )
     points = fields["POINTS"]
@@ -28,15 +30,16 @@ def read(path: Path) -> Cloud:
     if missing:
         raise InputError(f"{path}: has no field {missing[0]!r}; fields: {', '.join(dtype.names)}")
     position = np.stack([table[name].astype(np.float64) for name in "xyz"], axis=1)
-    rest = {n: table[n].copy() for n in dtype.names if n not in "xyz" and n != "_" and table[n].ndim == 1}
-    return Cloud(position, rest)
+    kept = [name for name in fields["FIELDS"] if name not in ("x", "y", "z", "_") and table[name].ndim == 1]
+    return Cloud(position, {name: table[name].copy() for name in kept})
 
 
 def write(path: Path, cloud: Cloud) -> None:
     """Write binary with 8-byte coordinates."""
     columns = {name: cloud.points[:, axis] for axis, name in enumerate("xyz")}
     for name, values in cloud.columns().items():
-        columns[name.replace(" ", "_")] = values if values.dtype.kind in _LETTERS else values.astype(np.float64)
+        known = values.dtype.kind in _LETTERS and values.dtype != np.float16
+        columns[name.replace(" ", "_")] = values if known else values.astype(np.float64)
     dtype = np.dtype([(name, "<" + values.dtype.str[1:]) for name, values in columns.items()])
     table = np.empty(len(cloud), dtype)
     for name, values in columns.items():
@@ -79,12 +82,17 @@ def _header(content: bytes, path: Path) -> tuple[dict, int]:
 def _table(body: bytes, kind: str, dtype: np.dtype, points: int, path: Path) -> np.ndarray:
     needed = points * dtype.itemsize
     if kind == "ascii":
-        rows = np.loadtxt(io.BytesIO(body), ndmin=2)
+        widths = {name: int(np.prod(dtype[name].shape, dtype=int)) for name in dtype.names}
+        rows = np.loadtxt(io.BytesIO(body), ndmin=2) if body.strip() else np.empty((0, sum(widths.values())))
         if len(rows) != points:
             raise InputError(f"{path}: the header promises {points} points, the file holds {len(rows)}; it is cut off")
+        if rows.shape[1] != sum(widths.values()):
+            promised = f"{sum(widths.values())} values a point"
+            raise InputError(
+                f"{path}: the header promises {promised}, the lines hold {rows.shape[1]}; check or re-export it"
+            )
         table, column = np.empty(points, dtype), 0
-        for name in dtype.names:
-            width = int(np.prod(dtype[name].shape, dtype=int))
+        for name, width in widths.items():
             table[name] = rows[:, column] if dtype[name].shape == () else rows[:, column : column + width]
             column += width
         return table

@@ -30,6 +30,8 @@ def read(path: Path) -> Cloud:
         try:
             elements = load_ply(file)["metadata"]["_ply_raw"]
         except KeyError as error:
+            if error.args[0] not in ("x", "y", "z"):
+                raise
             raise InputError(f"{path}: has no vertex property {error}; x, y and z are needed") from error
     if "vertex" not in elements or not elements["vertex"]["length"]:
         raise InputError(f"{path}: holds no vertices")
@@ -38,13 +40,14 @@ def read(path: Path) -> Cloud:
     missing = [name for name in "xyz" if name not in names]
     if missing:
         raise InputError(f"{path}: the vertices have no property {missing[0]!r}; properties: {', '.join(names)}")
-    columns = {name: np.asarray(data[name]).squeeze() for name in names}
-    count = elements["vertex"]["length"]
-    if any(columns[name].shape != (count,) for name in "xyz"):
-        raise InputError(f"{path}: the header promises {count} vertices, the file holds fewer; it is cut off")
+    count, kinds = elements["vertex"]["length"], elements["vertex"]["properties"]
+    columns = {name: np.asarray(data[name]) for name in names if "$LIST" not in kinds[name]}
+    # Rows that end early make columns of objects, or short ones.
+    if any(values.size != count or values.dtype == object for values in columns.values()):
+        raise InputError(f"{path}: the header promises {count} whole vertices, the file holds fewer; it is cut off")
+    columns = {name: values.reshape(count).astype(values.dtype.newbyteorder("=")) for name, values in columns.items()}
     points = np.stack([columns.pop(name).astype(np.float64) for name in "xyz"], axis=1)
-    kept = {name: values.astype(values.dtype.newbyteorder("=")) for name, values in columns.items() if values.ndim == 1}
-    return Cloud(points, kept)
+    return Cloud(points, columns)
 
 
 def write(path: Path, cloud: Cloud) -> None:

@@ -23,7 +23,7 @@ def read(path: Path) -> Cloud:
         ) from error
     if "\x00" in content:
         raise InputError(f"{path}: is binary, not text; binary clouds end in .ply, .npy, .pcd, .las or .bin")
-    skipped, header, first = _leading_lines(content, path)
+    skipped, count, header, first = _leading_lines(content, path)
     delimiter = next((mark for mark in (",", ";") if mark in first), None)
     names = _split(header, delimiter) if header else []
     try:
@@ -32,13 +32,15 @@ def read(path: Path) -> Cloud:
         raise InputError(f"{path}: {_explain(str(error), skipped)}") from error
     if table.shape[1] < 3:
         raise InputError(f"{path}: {table.shape[1]} column(s) found, at least x y z are needed")
+    if count is not None and len(table) < count:
+        raise InputError(f"{path}: the first line promises {count} points, the file holds {len(table)}; it is cut off")
     if len(names) != table.shape[1]:
         names = []
     lowered = [name.lower() for name in names]
     axes = [lowered.index(name) for name in "xyz"] if set("xyz") <= set(lowered) else [0, 1, 2]
-    labels = names or [f"column{i}" for i in range(table.shape[1])]
+    labels = _labels(names or [""] * table.shape[1])
     attributes = {labels[i]: table[:, i] for i in range(table.shape[1]) if i not in axes}
-    meta = {"delimiter": delimiter, "axes": axes, "names": names, "count_line": _is_count(content)}
+    meta = {"delimiter": delimiter, "axes": axes, "names": names, "count_line": count is not None}
     return Cloud(np.ascontiguousarray(table[:, axes]), attributes, {"text": meta})
 
 
@@ -72,30 +74,34 @@ def write(path: Path, cloud: Cloud) -> None:
 
 def _attribute_format(values: np.ndarray) -> str:
     whole = np.isfinite(values).all() and bool((values == np.round(values)).all())
-    return "%d" if whole else "%.9g"
+    # 15 digits bring back what a person or another program wrote, GPS time included; float32 has no more than 9.
+    return "%d" if whole else "%.9g" if values.dtype == np.float32 else "%.15g"
 
 
-def _is_count(content: str) -> bool:
-    """Tell whether the file starts with a count line, as .pts files do: a whole number alone before wider rows."""
-    lines = content.split("\n", 2)
-    return len(lines) > 1 and lines[0].strip().isdigit() and len(lines[1].replace(",", " ").split()) >= 3
+def _labels(names: list[str]) -> list[str]:
+    """Return one name for each column: empty and repeated ones get the column's number."""
+    return [
+        name if name and names.count(name) == 1 else f"{name}_{i}" if name else f"column{i}"
+        for i, name in enumerate(names)
+    ]
 
 
-def _leading_lines(content: str, path: Path) -> tuple[int, str | None, str]:
-    """Return how many lines precede the numbers, the header among them, and the first row."""
-    header = None
+def _leading_lines(content: str, path: Path) -> tuple[int, int | None, str | None, str]:
+    """Return how many lines precede the numbers, the point count and the header among them, and the first row."""
+    header, count = None, None
     for number, line in enumerate(content.splitlines()):
-        stripped = line.strip()
-        if not stripped or stripped.startswith(("#", "//")):
-            candidate = stripped.lstrip("#/ ")
+        stripped = re.split(r"#|//", line, maxsplit=1)[0].strip()
+        if not stripped:
+            candidate = line.strip().lstrip("#/ ")
             if candidate and all(not _NUMBER.match(word) for word in re.split(r"[\s,;]+", candidate)):
                 header = candidate
             continue
         words = [word for word in re.split(r"[\s,;]+", stripped) if word]
-        if number == 0 and len(words) == 1 and words[0].isdigit():
+        if count is None and len(words) == 1 and words[0].isdigit():
+            count = int(words[0])
             continue
         if all(_NUMBER.match(word) for word in words):
-            return number, header, stripped
+            return number, count, header, stripped
         if header is None or number == 0:
             header = stripped
             if number < 2:

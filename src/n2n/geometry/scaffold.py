@@ -1,5 +1,6 @@
 """A coarse oriented surface from local fits: it tells a field where inside is, before any learning."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,11 +63,11 @@ class Scaffold:
         return result
 
     def far_field(
-        self, lower: NDArray[np.float64], upper: NDArray[np.float64], margin: float, seed: int = 0
+        self, cloud: NDArray[np.float64], lower: Sequence[float], upper: Sequence[float], margin: float, seed: int = 0
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return random positions of the box farther than `margin` from the samples, (m, 3), and their signs, (m,)."""
+        """Return random positions of the box farther than `margin` from the cloud, (m, 3), and their signs, (m,)."""
         positions = np.random.default_rng(seed).uniform(lower, upper, (_FAR_POSITIONS, 3))
-        positions = positions[cKDTree(self.points).query(positions)[0] > margin]
+        positions = positions[cKDTree(cloud).query(positions)[0] > margin]
         return positions, self.sign(positions)
 
 

@@ -51,7 +51,7 @@ def estimate_scales(points: NDArray[np.float64], seed: int = 0) -> Scales:
         distance, index = tree.query(probes, k)
         radius, residual = _quadric_residual(points[index])
         # The lower quartile: patches that hold an edge or two sheets inflate the mean, never the quartile.
-        noise = float(np.quantile(residual, 0.25)) * (1 + 0.5 / np.sqrt(k))
+        noise = float(np.quantile(residual, 0.25) * (1 + 0.5 / np.sqrt(k)))
         width = float(np.median(radius))
         ratio = width / max(noise, 1e-12)
         if ratio > best_ratio:

@@ -24,6 +24,12 @@ def power_norm(difference: Tensor, p: int) -> Tensor:
     return squared.where(positive, 1.0).sqrt() * positive
 
 
+def _exponent(p: int) -> int:
+    if p not in (1, 2):
+        raise ValueError(f"p must be 1 or 2, got {p}")
+    return p
+
+
 class EMD:
     """Earth mover's distance: mean |g - phi(g)|^p under the best one-to-one map.
 
@@ -34,9 +40,7 @@ class EMD:
     """
 
     def __init__(self, p: int = 1) -> None:
-        if p not in (1, 2):
-            raise ValueError(f"p must be 1 or 2, got {p}")
-        self.p = p
+        self.p = _exponent(p)
 
     def match(self, moved: Leaves, target: Leaves) -> LeafIndex:
         """Return phi, (b, k)."""
@@ -57,7 +61,7 @@ class Chamfer:
     """
 
     def __init__(self, p: int = 1) -> None:
-        self.p = p
+        self.p = _exponent(p)
 
     @torch.no_grad()
     def match(self, moved: Leaves, target: Leaves) -> tuple[LeafIndex, LeafIndex]:
@@ -98,7 +102,7 @@ class Sinkhorn(_SoftDistance):
     """
 
     def __init__(self, epsilon: float = 0.01, iterations: int = 100, p: int = 1) -> None:
-        self.epsilon, self.iterations, self.p = epsilon, iterations, p
+        self.epsilon, self.iterations, self.p = epsilon, iterations, _exponent(p)
 
     def match(self, moved: Leaves, target: Leaves) -> Coupling:
         return sinkhorn_plan(moved.detach(), target, self.epsilon, self.iterations, self.p)
@@ -112,7 +116,7 @@ class Approximate(_SoftDistance):
     """
 
     def __init__(self, p: int = 1) -> None:
-        self.p = p
+        self.p = _exponent(p)
 
     def match(self, moved: Leaves, target: Leaves) -> Coupling:
         return approximate_plan(moved.detach(), target)

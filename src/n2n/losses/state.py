@@ -19,12 +19,14 @@ class Guide:
         points, normals: Oriented samples of the surface (normals outwards), (s, 3) each.
         far_points: Positions of the box that are clearly off the surface, (m, 3).
         far_signs: -1 inside, +1 outside, (m,).
+        area: Surface area.
     """
 
     points: Points
     normals: Points
     far_points: Float[Tensor, "m 3"]
     far_signs: Float[Tensor, " m"]
+    area: float
 
 
 @dataclass

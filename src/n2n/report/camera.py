@@ -66,7 +66,7 @@ class Camera:
         scale = shape[1] / self.extent[0]
         return scale * view * [1, -1, 1] + [shape[1] / 2, shape[0] / 2, 0]
 
-    def on_ground(self, points: NDArray[np.float64], light: NDArray[np.float64]) -> NDArray[np.float64]:
+    def on_ground(self, points: NDArray[np.float64], light: NDArray[np.floating]) -> NDArray[np.float64]:
         """Return where the shadow of points falls; `light` (3,) points to the light, view coordinates."""
         direction = light @ self.rotation
         height = points @ self.up - self.ground

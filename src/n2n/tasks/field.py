@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from pickle import UnpicklingError
 from typing import Any
 
 import numpy as np
@@ -114,10 +115,9 @@ class Field:
             frames = [Frame(tuple(frame["centre"]), frame["scale"]) for frame in state["frames"]]
             sdf = build_field(state["config"], len(frames))
             sdf.load_state_dict(state["weights"])
-        except (RuntimeError, KeyError, EOFError, ValueError, TypeError) as error:
-            raise InputError(
-                f"{path} cannot be read as an n2n field ({str(error).splitlines()[0]}); fit again"
-            ) from error
+        except (RuntimeError, KeyError, EOFError, ValueError, TypeError, UnpicklingError) as error:
+            reason = (str(error) or type(error).__name__).splitlines()[0]
+            raise InputError(f"{path} cannot be read as an n2n field ({reason}); fit again") from error
         return cls(sdf.eval().to(pick_device(device)), frames, state["config"], state["report"])
 
 

@@ -51,6 +51,8 @@ def upsample_points(
     if rate < 1:
         raise InputError(f"rate must be at least 1, got {rate}")
     clean = denoise_points(sdf, frame, points, shape)
+    if len(clean) < 2:
+        return np.repeat(clean, rate, axis=0)
     spacing = cKDTree(clean).query(clean, 2)[0][:, 1:]
     gap = np.maximum(spacing, np.median(spacing))
     random = np.random.default_rng(seed)

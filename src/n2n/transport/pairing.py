@@ -46,6 +46,8 @@ class StratifiedPairing:
     """
 
     def __init__(self, batch_size: int, leaf_size: int = 64) -> None:
+        if leaf_size < 1:
+            raise ValueError(f"leaf_size must be at least 1, got {leaf_size}")
         self.batch_size, self.leaf_size = batch_size, leaf_size
 
     def __call__(

@@ -1,0 +1,124 @@
+"""A fit that was interrupted gives the weights of one that was not."""
+
+from functools import cache
+
+import pytest
+import torch
+
+from n2n.compose import compose
+from n2n.datamodules.observations import ObservationsDataModule
+from n2n.fitting.fit import LAST_CHECKPOINT, fit
+from n2n.geometry.shapes import scan
+
+BLOCKS = ["iterations=40", "plan_reuse=10", "checkpoint_every=10", "device=cpu"]
+RECIPES = {
+    "fast": [],
+    "pairs of observations": ["pairs=random", "batch_size=100"],
+    "paper": ["recipe=paper", "architecture.width=32", "architecture.layers=3", "batch_size=64"],
+    "network": ["architecture=siren", "architecture.width=32", "architecture.layers=2"],
+}
+
+
+def _data(count=2):
+    return ObservationsDataModule([[scan("sphere", 200, 0.02, seed) for seed in range(count)]])
+
+
+def _config(recipe="fast", *overrides):
+    return compose([*RECIPES[recipe], *BLOCKS, *overrides])
+
+
+@cache
+def _whole(recipe="fast"):
+    """The fit that nothing disturbed."""
+    return fit(_data(), _config(recipe))
+
+
+def _stop_at(iteration):
+    def report(done, total, values):
+        if done == iteration:
+            raise KeyboardInterrupt
+
+    return report
+
+
+def _interrupted(config, run_dir, iteration, data=None):
+    # Lightning turns Ctrl-C into an exit of its own.
+    with pytest.raises((KeyboardInterrupt, SystemExit)):
+        fit(data or _data(), config, run_dir, _stop_at(iteration))
+
+
+def _assert_equal(result, other):
+    weights, others = result.field.state_dict(), other.field.state_dict()
+    assert weights.keys() == others.keys()
+    for name in weights:
+        assert torch.equal(weights[name], others[name]), name
+
+
+@pytest.mark.parametrize("recipe", RECIPES)
+def test_resuming_changes_nothing(tmp_path, recipe):
+    _interrupted(_config(recipe), tmp_path, 30)
+    # Nothing but tensors and plain numbers may be in a checkpoint: it is loaded with weights_only=True.
+    state = torch.load(tmp_path / LAST_CHECKPOINT, weights_only=True)
+    assert all(value.isfinite().all() for value in state["state_dict"].values())
+    resumed = fit(_data(), _config(recipe), tmp_path)
+    assert 0 < resumed.report["resumed_at"] == state["global_step"] < 40
+    _assert_equal(resumed, _whole(recipe))
+
+
+def test_resuming_twice_changes_nothing(tmp_path):
+    _interrupted(_config(), tmp_path, 20)
+    _interrupted(_config(), tmp_path, 30)
+    _assert_equal(fit(_data(), _config(), tmp_path), _whole())
+
+
+def test_resuming_counts_on_from_where_it_was(tmp_path):
+    config = _config()
+    _interrupted(config, tmp_path, 30)
+    seen = []
+    result = fit(_data(), config, tmp_path, lambda done, total, values: seen.append(done))
+    assert seen == list(range(result.report["resumed_at"] + 10, 41, 10))
+
+
+def test_an_interruption_before_the_first_checkpoint_starts_anew(tmp_path):
+    config = _config("fast", "checkpoint_every=30")
+    _interrupted(config, tmp_path, 10)
+    assert not (tmp_path / LAST_CHECKPOINT).exists()
+    again = fit(_data(), config, tmp_path)
+    assert again.report["resumed_at"] == 0
+    _assert_equal(again, _whole())
+
+
+def test_a_finished_fit_that_was_not_saved_comes_back_trained(tmp_path):
+    # The program may be killed after the last checkpoint and before the field is written.
+    config = _config()
+    whole = fit(_data(), config, tmp_path)
+    assert torch.load(tmp_path / LAST_CHECKPOINT, weights_only=True)["global_step"] == 40
+    _assert_equal(fit(_data(), config, tmp_path), whole)
+
+
+def test_several_shapes_resume(tmp_path):
+    def data():
+        return ObservationsDataModule([[scan("sphere", 200, 0.02)], [scan("torus", 200, 0.01)]])
+
+    config = _config()
+    _interrupted(config, tmp_path, 30, data())
+    _assert_equal(fit(data(), config, tmp_path), fit(data(), config))
+
+
+def test_checkpoints_are_written_as_often_as_asked(tmp_path):
+    steps = []
+
+    def report(done, total, values):
+        path = tmp_path / LAST_CHECKPOINT
+        steps.append(torch.load(path, weights_only=True)["global_step"] if path.exists() else None)
+
+    # The report comes before the checkpoint of the same block.
+    fit(_data(1), _config("fast", "checkpoint_every=20"), tmp_path, report)
+    assert steps == [None, None, 20, 20]
+    assert [path.name for path in tmp_path.iterdir()] == [LAST_CHECKPOINT]
+
+
+def test_nothing_is_written_without_a_run_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    fit(_data(1), compose(["iterations=10", "plan_reuse=5", "device=cpu"]))
+    assert list(tmp_path.iterdir()) == []
