@@ -21,6 +21,7 @@ _NOISE_FLOOR = 0.05  # of the spacing: a clean cloud still has one length that l
 _VOXEL = 0.33
 _STIFFNESS = 1.75
 _THIN_PLATE = 8e-3
+_MAX_CELLS = 3e6  # a whole street in one grid would need more; it gets a coarser one instead
 _BAND_VOXELS = 3.0
 _MAX_BATCH = 32_768
 _PLAN_REUSE = 20
@@ -102,12 +103,12 @@ def measure(observations: list[NDArray[np.float64]], seed: int = 0) -> tuple[Sca
 def choose(scales: Scales, observations: list[NDArray[np.float64]]) -> Chosen:
     """Turn measured scales into the parameters of the fast recipe."""
     noise = max(scales.noise, _NOISE_FLOOR * scales.spacing)
-    voxel = _VOXEL * (noise * scales.spacing) ** 0.25
     pad = max(0.12, 4 * noise)
     total = sum(map(len, observations))
     sampled = min(DENOISED_POINTS, max(map(len, observations)))
     lower = np.min([points.min(axis=0) for points in observations], axis=0) - pad
     upper = np.max([points.max(axis=0) for points in observations], axis=0) + pad
+    voxel = max(_VOXEL * (noise * scales.spacing) ** 0.25, float(np.prod(upper - lower) / _MAX_CELLS) ** (1 / 3))
     return Chosen(
         noise=noise,
         spacing=scales.spacing,
