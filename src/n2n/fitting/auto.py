@@ -103,7 +103,7 @@ def measure(observations: list[NDArray[np.float64]], seed: int = 0) -> tuple[Sca
 def choose(scales: Scales, observations: list[NDArray[np.float64]]) -> Chosen:
     """Turn measured scales into the parameters of the fast recipe."""
     noise = max(scales.noise, _NOISE_FLOOR * scales.spacing)
-    pad = max(0.12, 4 * noise)
+    pad = max(0.12, 4 * noise, scales.spacing)
     total = sum(map(len, observations))
     sampled = min(DENOISED_POINTS, max(map(len, observations)))
     lower = np.min([points.min(axis=0) for points in observations], axis=0) - pad
