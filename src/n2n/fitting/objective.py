@@ -27,7 +27,7 @@ class Block:
     queries: Tensor
     targets: Tensor
     plan: Any
-    denoised: Tensor
+    denoised: Tensor | None
     far: tuple[Tensor, Tensor] | None
 
 
@@ -53,6 +53,7 @@ class Objective:
         self.distance, self.pairing, self.queries = distance, pairing, queries
         self.terms = {name: (weight, term) for name, (weight, term) in terms.items() if weight}
         self.guides = guides
+        self._wants_denoised = any(getattr(term, "needs_denoised", False) for _, term in self.terms.values())
 
     @torch.no_grad()
     def begin(self, field: Any, draw: Draw, generator: torch.Generator) -> Block:
@@ -65,9 +66,8 @@ class Objective:
         with field.shared():
             moved = self._pull(field, queries.reshape(-1, 3), draw.condition).reshape(queries.shape)
             plan = self.distance.match(moved, targets)
-            chosen = torch.randperm(len(draw.target), generator=generator)[:DENOISED_POINTS].to(draw.target.device)
-            denoised = self._pull(field, draw.target[chosen], draw.condition)
-            far = self._far(draw, denoised, field)
+            denoised = self._denoise(field, draw, generator)
+            far = self._far(field, draw, denoised)
         return Block(draw, queries, targets, plan, denoised, far)
 
     def loss(
@@ -108,10 +108,17 @@ class Objective:
         codes = torch.full((len(points),), condition, dtype=torch.long, device=points.device)
         return field.value_and_gradient(points, codes)
 
+    def _denoise(self, field: Any, draw: Draw, generator: torch.Generator) -> Tensor | None:
+        """Pull many of the targets, if anything will look at them: for a large network that costs more than a step."""
+        if not self._wants_denoised and self._guide(draw.condition) is None:
+            return None
+        chosen = torch.randperm(len(draw.target), generator=generator)[:DENOISED_POINTS].to(draw.target.device)
+        return self._pull(field, draw.target[chosen], draw.condition)
+
     def _guide(self, condition: int) -> Guide | None:
         return self.guides[condition] if self.guides else None
 
-    def _far(self, draw: Draw, denoised: Tensor, field: Any) -> tuple[Tensor, Tensor] | None:
+    def _far(self, field: Any, draw: Draw, denoised: Tensor | None) -> tuple[Tensor, Tensor] | None:
         """Return the guide's far points and their signed distance to the surface that the denoised set samples."""
         guide = self._guide(draw.condition)
         if guide is None or not len(guide.far_points):

@@ -43,6 +43,7 @@ class Consistency:
         if against not in ("batch", "larger"):
             raise ValueError(f"against must be 'batch' or 'larger', got {against!r}")
         self.against = against
+        self.needs_denoised = against == "larger"
 
     def __call__(self, state: FieldState) -> Tensor:
         cloud = state.pulled

@@ -40,7 +40,8 @@ class FieldState:
         pulled: F(n), Eq. 3.
         targets: Noisy points the queries are matched to.
         condition: Index of the shape the batch is from.
-        denoised: A larger denoised set of the same shape, detached, or None.
+        denoised: A larger denoised set of the same shape, detached; for terms with a true attribute `needs_denoised`,
+            else perhaps None.
         guide: Oriented surface samples and signs far from the surface, or None.
         far: Positions off the surface and their signed distances to the denoised set, or None.
         progress: Finished share of the fit, 0 to 1.

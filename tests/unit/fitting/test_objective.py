@@ -7,7 +7,7 @@ from n2n.datamodules.observations import Draw
 from n2n.fitting.objective import Objective
 from n2n.geometry.sampling import QuerySampler
 from n2n.losses.distances import EMD
-from n2n.losses.regularisers import OnSurface, ZeroLevel
+from n2n.losses.regularisers import Consistency, OnSurface, ZeroLevel
 from n2n.losses.state import Guide
 from n2n.testing import Ball
 from n2n.transport.pairing import GlobalPairing, StratifiedPairing
@@ -76,9 +76,15 @@ def test_jittered_queries_share_a_leaf_with_the_targets_they_came_from():
 
 
 def test_denoised_points_are_pulled_and_detached():
-    block = _objective().begin(Ball(0.4), _draw(), _generator())
+    terms = {"regulariser": (0.1, Consistency(against="larger"))}
+    block = _objective(terms=terms).begin(Ball(0.4), _draw(), _generator())
     assert torch.allclose(block.denoised.norm(dim=1), torch.full((400,), 0.4), atol=1e-5)
     assert not block.denoised.requires_grad
+
+
+def test_nothing_is_denoised_that_nobody_looks_at():
+    terms = {"regulariser": (0.1, Consistency(against="batch"))}
+    assert _objective(terms=terms).begin(Ball(0.4), _draw(), _generator()).denoised is None
 
 
 def test_far_points_get_their_signed_distance_to_the_denoised_cloud():
