@@ -14,8 +14,17 @@ OPEN_KEYS = (
     "architecture", "distance", "pairing", "regulariser", "terms", "optimizer", "scheduler", "datamodule", "logger",
 )  # fmt: skip
 
-# Whole numbers and the lowest value of each; `auto` and null are kept.
-_WHOLE = {"seed": 0, "iterations": 1, "batch_size": 1, "plan_reuse": 1, "checkpoint_every": 1, "num_observations": 1}
+# Seeds of numpy, torch and Lightning; larger ones are refused by one or the other.
+MAX_SEED = 2**31 - 1
+# Whole numbers and the lowest value of each; `auto` is kept.
+_WHOLE = {
+    "iterations": 1,
+    "batch_size": 1,
+    "plan_reuse": 1,
+    "checkpoint_every": 1,
+    "pulls": 1,
+    "num_observations": 1,
+}
 
 
 @dataclass
@@ -43,11 +52,12 @@ class Config:
         iterations: Optimiser steps; auto = what the architecture needs.
         batch_size: B, points matched at once; auto = all points of an observation.
         num_observations: N, observations used per shape; null = all.
-        regulariser_weight: lambda of Eq. 7.
+        regulariser_weight: lambda of Eq. 7; null without a regulariser.
         plan_reuse: Optimiser steps per matching.
         pairs: Observations of a pair: random (i, j) or same (i = j).
         scaffold: Build an oriented local fit before the fit (needed by the terms scaffold, far_field, smoothness).
         checkpoint_every: Iterations between checkpoints.
+        pulls: Times F is applied to denoise a point.
         terms: Further weighted terms of the loss: name -> {weight, arguments}.
     """
 
@@ -57,11 +67,12 @@ class Config:
     iterations: Any = AUTO
     batch_size: Any = AUTO
     num_observations: int | None = None
-    regulariser_weight: float = 0.0
+    regulariser_weight: float | None = None
     plan_reuse: Any = 1
     pairs: str = "random"
     scaffold: bool = False
     checkpoint_every: int = 1000
+    pulls: int = 3
     queries: QueriesConfig = field(default_factory=QueriesConfig)
     architecture: dict[str, Any] = field(default_factory=dict)
     distance: dict[str, Any] = field(default_factory=dict)
@@ -77,9 +88,13 @@ class Config:
         _one_of("device", self.device, DEVICES)
         _one_of("task", self.task, TASKS)
         _one_of("pairs", self.pairs, PAIRS)
-        _at_least("regulariser_weight", self.regulariser_weight, 0)
+        if self.regulariser_weight is not None:
+            _at_least("regulariser_weight", self.regulariser_weight, 0)
         for key, lowest in _WHOLE.items():
-            setattr(self, key, _whole(key, getattr(self, key), lowest))
+            # null: all observations; no other number may be missing.
+            if key != "num_observations" or self.num_observations is not None:
+                setattr(self, key, _whole(key, getattr(self, key), lowest))
+        check_seed(self.seed)
         for name, spec in self.terms.items():
             if spec is not None:
                 if not isinstance(spec, dict):
@@ -92,9 +107,15 @@ def _one_of(key: str, value: Any, known: tuple[str, ...]) -> None:
         raise ConfigError(f"{key}={value} is not known; choose one of: {', '.join(known)}")
 
 
+def check_seed(seed: int) -> None:
+    """Raise ConfigError for a seed that some random generator would refuse."""
+    if not 0 <= seed <= MAX_SEED:
+        raise ConfigError(f"seed={seed} is out of range; give a whole number from 0 to {MAX_SEED}")
+
+
 def _whole(key: str, value: Any, lowest: int) -> Any:
     """Return a whole number; 1e5 is one, although YAML reads it as a float."""
-    if value is None or value == AUTO:
+    if value == AUTO:
         return value
     _at_least(key, value, lowest)
     if value != value // 1:
@@ -105,6 +126,7 @@ def _whole(key: str, value: Any, lowest: int) -> Any:
 def _at_least(key: str, value: Any, lowest: int) -> None:
     if value == AUTO:
         return
+    value = "null" if value is None else value  # as it is written
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ConfigError(f"{key}={value} is not a number; give a number >= {lowest}")
     if not lowest <= value < float("inf"):

@@ -32,9 +32,16 @@ def check_components(config: Mapping[str, Any]) -> None:
         if spec is not None:
             arguments = {key: value for key, value in spec.items() if key != "weight"}
             REGULARISERS.check({"name": name, **arguments})
+    _check_weight(config["regulariser"].get("name"), config["regulariser_weight"])
     for key, positional in _POSITIONAL.items():
         if config[key]:
             _check_target(key, config[key], positional)
+
+
+def _check_weight(name: Any, weight: float | None) -> None:
+    """A regulariser without a weight would do nothing; one of weight 0 is meant to."""
+    if name != "none" and weight is None:
+        raise ConfigError(f"regulariser={name} needs its lambda; give it as regulariser_weight=0.1")
 
 
 def _check_target(key: str, spec: Mapping[str, Any], positional: int) -> None:

@@ -4,6 +4,7 @@ import pytest
 
 from n2n import registry
 from n2n.compose import compose, conf_dir
+from n2n.errors import ConfigError
 
 GROUPS = sorted(folder.name for folder in conf_dir().iterdir() if folder.is_dir() and folder.name != "setting")
 OPTIONS = [(group, option.stem) for group in GROUPS for option in sorted((conf_dir() / group).glob("*.yaml"))]
@@ -17,7 +18,8 @@ def test_the_default_is_the_fast_recipe():
 @pytest.mark.parametrize("base", ["recipe=fast", "recipe=paper", "experiment=released_code"])
 @pytest.mark.parametrize(("group", "option"), OPTIONS)
 def test_any_option_goes_with_any_recipe(base, group, option):
-    config = compose([base, f"{group}={option}", *NEEDS.get((group, option), [])])
+    weight = ["regulariser_weight=0.1"] if group == "regulariser" else []
+    config = compose([base, f"{group}={option}", *weight, *NEEDS.get((group, option), [])])
     assert config["iterations"] == "auto" or config["iterations"] >= 1
 
 
@@ -39,8 +41,15 @@ def test_every_registered_name_has_an_option_of_its_name(kind, group):
 
 def test_every_regulariser_can_be_lambda_r_and_a_term():
     for name in registry.REGULARISERS.names():
-        config = compose([f"regulariser.name={name}", f"terms.{name}=null", f"terms.{name}={{weight:0.5}}"])
+        config = compose(
+            [f"regulariser.name={name}", "regulariser_weight=0", f"terms.{name}=null", f"terms.{name}={{weight:0.5}}"]
+        )
         assert config["terms"][name] == {"weight": 0.5}
+
+
+def test_a_regulariser_is_not_dropped_for_want_of_a_weight():
+    with pytest.raises(ConfigError, match="regulariser=eikonal needs its lambda; give it as regulariser_weight=0.1"):
+        compose(["regulariser=eikonal"])
 
 
 @pytest.mark.parametrize(

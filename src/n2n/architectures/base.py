@@ -55,7 +55,8 @@ class SDF(nn.Module):
         if not getattr(self, "_bands", None):
             raise RuntimeError("call set_band(points, radius) before roughness()")
         energy = 0.0
-        for condition, (points, radius) in self._bands.items():
+        for condition, (cloud, radius) in self._bands.items():
+            points = cloud.to(next((p.device for p in self.parameters()), cloud.device))
             chosen = torch.randint(len(points), (_ROUGHNESS_SAMPLES,), generator=generator).to(points.device)
             offset = (2 * torch.rand(len(chosen), 3, generator=generator) - 1).to(points) * radius
             direction = functional.normalize(torch.randn(len(chosen), 3, generator=generator).to(points), dim=-1)

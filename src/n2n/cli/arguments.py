@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from n2n import __version__
-from n2n.config import DEVICES
+from n2n.config import DEVICES, check_seed
 from n2n.errors import ConfigError
 from n2n.registry import suggest
 
@@ -16,9 +16,13 @@ examples:
   n2n denoise scan.xyz -o clean.xyz                    same points, same order, on the surface
   n2n upsample scan.xyz --rate 4 -o dense.xyz
   n2n demo                                             see it work on a bundled scan
-  n2n fit recipe=paper datamodule=files datamodule.paths=[scan.ply]
+  n2n fit recipe=paper datamodule=files 'datamodule.paths=[scan.ply]'
 
 `n2n COMMAND --help` tells more. Settings are `key=value`, e.g. seed=1; `n2n fit --cfg job` prints them all.
+"""
+_SETTINGS = """settings:
+  key=value      a setting of the fit, e.g. iterations=500 or recipe=paper; `n2n fit --cfg job` lists the keys.
+                 Quote brackets: 'key=[a,b]'
 """
 _READS = "ply xyz txt csv pts npy npz off obj stl pcd las laz bin"
 _WRITES = {"reconstruct": "ply obj off stl glb", "denoise": "ply xyz txt csv npy npz pcd las laz"}
@@ -66,21 +70,38 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
+def _seed(text: str) -> int:
+    try:
+        seed = int(text)
+        check_seed(seed)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"invalid int value: {text!r}") from None
+    except ConfigError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+    return seed
+
+
 def _add_task(commands: argparse._SubParsersAction, task: str, summary: str, examples: str) -> None:
     command = commands.add_parser(
         task,
         help=summary,
         usage=f"n2n {task} FILE [FILE ...] -o OUTPUT [options] [key=value ...]",
         description=f"{summary[0].upper()}{summary[1:]}. Several files are several observations of one thing.",
-        epilog=f"examples:\n  {examples}",
+        epilog=f"{_SETTINGS}\nexamples:\n  {examples}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     writes = _WRITES.get(task, _WRITES["denoise"])
     command.add_argument("inputs", nargs="*", metavar="FILE", help=f"noisy points: {_READS}")
-    command.add_argument("-o", "--output", required=True, metavar="OUTPUT", help=f"file or folder/: {writes}")
+    command.add_argument(
+        "-o", "--output", required=True, metavar="OUTPUT", help=f"file or folder/, made if missing: {writes}"
+    )
     if task == "reconstruct":
         command.add_argument(
-            "--resolution", type=int, default=256, metavar="N", help="voxels along the longest side (256)"
+            "--resolution",
+            type=int,
+            default=256,
+            metavar="N",
+            help="voxels along the longest side of the field's box, about a tenth wider than the scan (256)",
         )
         command.add_argument("--edge", type=float, metavar="LENGTH", help="voxel edge in the scan's units instead")
     if task == "upsample":
@@ -91,7 +112,7 @@ def _add_task(commands: argparse._SubParsersAction, task: str, summary: str, exa
         "--shape", type=int, default=0, metavar="K", help="which shape of a run that holds several (0)"
     )
     command.add_argument("--device", default="auto", choices=DEVICES, help="where to compute (auto)")
-    command.add_argument("--seed", type=int, default=0, metavar="S", help="seed of everything random (0)")
+    command.add_argument("--seed", type=_seed, default=0, metavar="S", help="seed of everything random (0)")
     command.add_argument("-q", "--quiet", action="store_true", help="no progress bar, no summary")
 
 

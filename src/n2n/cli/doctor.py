@@ -2,26 +2,10 @@
 
 import os
 import platform
-from importlib.metadata import PackageNotFoundError, version
-from importlib.util import find_spec
+from collections.abc import Iterator
+from importlib.metadata import PackageNotFoundError, requires, version
 
 from n2n import __version__
-
-_REQUIRED = (
-    "torch", "lightning", "hydra-core", "omegaconf", "numpy", "scipy", "scikit-image", "trimesh", "matplotlib", "rich",
-    "jaxtyping",
-)  # fmt: skip
-# Package -> module, what it is for, how to get it.
-_OPTIONAL = {
-    "laspy": ("laspy", "reading and writing .las", "pip install 'laspy[lazrs]'"),
-    "lazrs": ("lazrs", "compressed .laz", "pip install 'laspy[lazrs]'"),
-    "wandb": ("wandb", "logger=wandb", "pip install wandb"),
-    "point-cloud-utils": ("point_cloud_utils", "mesh distances", "pip install point-cloud-utils"),
-}
-if platform.machine() == "aarch64" and platform.system() == "Linux":
-    # No wheel of point-cloud-utils there.
-    _OPTIONAL.pop("point-cloud-utils")
-    _OPTIONAL["libigl"] = ("igl", "mesh distances", "pip install libigl")
 
 
 def run_doctor() -> int:
@@ -29,17 +13,14 @@ def run_doctor() -> int:
     print(f"n2n {__version__}, Python {platform.python_version()}, {platform.system()} {platform.machine()}")
     print(f"{os.cpu_count()} CPU cores{_available()}\n")
     problems = []
-    for package in _REQUIRED:
+    for package, wanted in _required():
         found = _version(package)
-        print(f"  {package:<18} {found or f'MISSING: pip install {package}'}")
-        if found is None:
+        state = found or f"MISSING: pip install {package}"
+        if found and not _fits(found, wanted):
+            state = f"{found} DOES NOT FIT: pip install '{package}{wanted}'"
+        if state != found:
             problems.append(package)
-    print("optional")
-    for package, (module, purpose, remedy) in _OPTIONAL.items():
-        found = _version(package) if find_spec(module) else None
-        print(
-            f"  {package:<18} {f'{found} ({purpose})' if found else f'not installed, needed for {purpose}: {remedy}'}"
-        )
+        print(f"  {package:<18} {state}")
     print("devices")
     if not _describe_devices():
         problems.append("torch")
@@ -51,6 +32,40 @@ def run_doctor() -> int:
         return 1
     print("\nready: try `n2n demo`")
     return 0
+
+
+def _required() -> list[tuple[str, str]]:
+    """Return what n2n's own metadata asks for on this machine: packages, and which versions of them."""
+    try:
+        from packaging.requirements import Requirement
+    except ImportError:
+        return [("packaging", "")]
+
+    def asked(package: str, extra: str = "") -> Iterator[Requirement]:
+        for requirement in map(Requirement, requires(package) or ()):
+            marker = requirement.marker
+            if marker is None or marker.evaluate({"extra": extra}):
+                yield requirement
+
+    needed = {}
+    try:
+        for requirement in asked("n2n"):
+            needed[requirement.name] = str(requirement.specifier)
+            for extra in requirement.extras if _version(requirement.name) else ():
+                # laspy[lazrs]: what the extra brings and the package alone does not.
+                plain = {str(further) for further in asked(requirement.name)}
+                for further in asked(requirement.name, extra):
+                    if str(further) not in plain:
+                        needed.setdefault(further.name, str(further.specifier))
+    except PackageNotFoundError:
+        return [("n2n", "")]
+    return sorted(needed.items())
+
+
+def _fits(found: str, wanted: str) -> bool:
+    from packaging.specifiers import SpecifierSet
+
+    return SpecifierSet(wanted).contains(found, prereleases=True)
 
 
 def _version(package: str) -> str | None:
@@ -74,8 +89,9 @@ def _describe_devices() -> bool:
         return False
     print(f"  {'cpu':<18} {torch.get_num_threads()} threads")
     for index in range(torch.cuda.device_count() if torch.cuda.is_available() else 0):
+        chosen = "" if index else "; chosen by device=auto"
         memory = torch.cuda.get_device_properties(index).total_memory / 2**30
-        print(f"  {f'cuda:{index}':<18} {torch.cuda.get_device_name(index)}, {memory:.0f} GiB; chosen by device=auto")
+        print(f"  {f'cuda:{index}':<18} {torch.cuda.get_device_name(index)}, {memory:.0f} GiB{chosen}")
     if not torch.cuda.is_available():
         if torch.version.cuda is None:
             print(f"  {'cuda':<18} torch is a CPU build; with an NVIDIA card: make setup TORCH=torch")

@@ -17,8 +17,8 @@ configuration again resumes an unfinished fit and leaves a finished one alone.
 
 examples:
   n2n fit                                  a generated scan, to see that all is well
-  n2n fit datamodule=files datamodule.paths=[scan.ply]
-  n2n fit datamodule=files datamodule.paths=[scan.ply] recipe=paper distance=cd
+  n2n fit datamodule=files 'datamodule.paths=[scan.ply]'
+  n2n fit datamodule=files 'datamodule.paths=[scan.ply]' recipe=paper distance=cd
   n2n fit terms.zero_level.weight=0.1      a further term of the loss; `n2n list regulariser` knows the names
   n2n fit -m seed=0,1,2                    several runs, one after the other
   n2n fit --cfg job                        print the composed configuration

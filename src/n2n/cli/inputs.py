@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from n2n.errors import InputError
 from n2n.formats import Cloud, read_cloud
-from n2n.geometry.checks import check_cloud
+from n2n.geometry.checks import count_distinct
 
 _WHAT_HAPPENS = {"denoise": "they are kept as they are"}
 
@@ -21,11 +21,13 @@ class Input:
         path: Where it is.
         cloud: As read; rows that are not finite included.
         finite: Which rows are finite, (n,).
+        repeated: How many of the finite rows are duplicates of others.
     """
 
     path: Path
     cloud: Cloud
     finite: NDArray[np.bool_]
+    repeated: int = 0
 
     @property
     def points(self) -> NDArray[np.float64]:
@@ -38,8 +40,16 @@ def split_overrides(arguments: list[str]) -> tuple[list[Path], list[str]]:
     files, overrides = [], []
     for argument in arguments:
         is_override = "=" in argument or argument.startswith("~")
-        (overrides if is_override and not Path(argument).exists() else files).append(argument)
+        (overrides if is_override and not _exists(argument) else files).append(argument)
     return [Path(name) for name in files], overrides
+
+
+def _exists(argument: str) -> bool:
+    try:
+        return Path(argument).exists()
+    except OSError:
+        # A long list of terms is no name of a file.
+        return False
 
 
 def read_inputs(paths: list[Path], task: str) -> list[Input]:
@@ -55,7 +65,8 @@ def read_inputs(paths: list[Path], task: str) -> list[Input]:
         cloud = read_cloud(path)
         item = Input(path, cloud, cloud.finite())
         left_out = len(cloud) - len(item.points)
-        check_cloud(item.points, f"{path} (without {left_out:,} NaN or infinite rows)" if left_out else str(path))
+        name = f"{path} (without {left_out:,} NaN or infinite rows)" if left_out else str(path)
+        item.repeated = len(item.points) - count_distinct(item.points, name)
         inputs.append(item)
     return inputs
 
@@ -66,7 +77,6 @@ def remarks(item: Input, task: str) -> list[str]:
     if left_out:
         happens = _WHAT_HAPPENS.get(task, "they are left out")
         lines.append(f"{item.path}: {left_out:,} of {len(item.cloud):,} rows are NaN or infinite; {happens}")
-    repeated = len(item.points) - len(np.unique(item.points, axis=0))
-    if repeated:
-        lines.append(f"{item.path}: {repeated:,} of {len(item.points):,} points are duplicates")
+    if item.repeated:
+        lines.append(f"{item.path}: {item.repeated:,} of {len(item.points):,} points are duplicates")
     return lines

@@ -22,7 +22,7 @@ RUNS = Path("runs")
 
 
 def fit_job(config: dict[str, Any]) -> Path:
-    """Fit one configuration into runs/<hash>/, resuming what is there; return the folder.
+    """Fit one configuration into runs/<hash of configuration and data>/, resuming what is there; return the folder.
 
     Args:
         config: As composed and validated.
@@ -30,18 +30,20 @@ def fit_job(config: dict[str, Any]) -> Path:
     Raises:
         N2NError: The data or the configuration cannot be used, or the folder cannot be written.
     """
-    run_dir = RUNS / config_hash(config)
+    pick_device(config["device"])
+    data = _read_data(config)
+    # The content of the files counts, not their names: a scan that was replaced is another run.
+    run_dir = RUNS / config_hash({**config, "data": data.fingerprint()})
     if (run_dir / FIELD_FILE).exists():
         say(f"fit: {run_dir} is finished already; delete it to fit again, or change a setting")
         return run_dir
-    pick_device(config["device"])
-    data = _read_data(config)
     is_new = not run_dir.exists()
     try:
         run_dir.mkdir(parents=True, exist_ok=True)
         OmegaConf.save(OmegaConf.create(config), run_dir / "config.yaml")
     except OSError as error:
         raise OutputError(f"{run_dir}: cannot be written ({error.strerror}); run n2n in another folder") from error
+    _keep_metrics(run_dir)
     start = time.perf_counter()
     failed = True
     try:
@@ -68,6 +70,13 @@ def fit_job(config: dict[str, Any]) -> Path:
     say(f"fit: {field.report['iterations']:,} iterations -> {run_dir}  ({seconds:.0f} s)")
     say(f"next: n2n reconstruct --run {run_dir} -o mesh.ply")
     return run_dir
+
+
+def _keep_metrics(run_dir: Path) -> None:
+    """Number the log of an interrupted fit: the logger would write over it."""
+    log = run_dir / "metrics.csv"
+    if log.exists():
+        log.rename(run_dir / f"metrics.{len(list(run_dir.glob('metrics.*.csv')))}.csv")
 
 
 def _read_data(config: dict[str, Any]) -> Any:

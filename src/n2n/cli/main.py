@@ -1,6 +1,7 @@
 """`n2n`: where commands are dispatched and errors become exit codes."""
 
 import argparse
+import signal
 import sys
 from collections.abc import Sequence
 
@@ -25,6 +26,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     except MemoryError:
         return _fail("not enough memory; use fewer points, a lower --resolution or a smaller batch_size")
     except KeyboardInterrupt as stop:
+        if argv is None:
+            # Our own process, which ends now: pressing Ctrl-C again must not end it in another way. Callers with a
+            # process of their own, which may be in a thread, keep their Ctrl-C.
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
         return _interrupted(str(stop))
     except BrokenPipeError:
         # The reader of our output has gone (n2n list | head); the interpreter would complain once more at exit.

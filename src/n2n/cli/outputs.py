@@ -1,6 +1,5 @@
 """Where results go, decided and checked before anything expensive starts."""
 
-import tempfile
 from pathlib import Path
 
 from n2n.errors import OutputError
@@ -11,7 +10,8 @@ def plan_outputs(output: str, paths: list[Path], extensions: tuple[str, ...], pe
     """Decide which files will be written, and check that they can be; nothing is created yet.
 
     Args:
-        output: What the user gave to -o: a file, or a folder (existing, or ending in a separator).
+        output: What the user gave to -o: a file, or a folder (existing, or ending in a separator). Missing folders are
+            no mistake; they are made with the first result.
         paths: The inputs.
         extensions: What this task can write.
         per_input: A folder gets one result per input; otherwise one result, named after the first.
@@ -22,18 +22,15 @@ def plan_outputs(output: str, paths: list[Path], extensions: tuple[str, ...], pe
     folder = Path(output)
     if not (output.endswith(("/", "\\")) or folder.is_dir()):
         targets = [folder]
-        check_writable(folder, extensions)
     else:
-        _check_folder(folder)
         named = paths if per_input else paths[:1]
         targets = [folder / (p.name if p.suffix.lower() in extensions else f"{p.stem}{extensions[0]}") for p in named]
         if not targets:
             raise OutputError(f"{folder}: is a folder; give a file name with -o, as no input names the result")
         if len(set(targets)) < len(targets):
             raise OutputError(f"{folder}: two inputs have the same file name, so one result would overwrite the other")
-        if folder.is_dir():
-            for target in targets:
-                check_writable(target, extensions)
+    for target in targets:
+        check_writable(target, extensions, new_folder=True)
     inputs = {path.resolve() for path in paths}
     for target in targets:
         if target.resolve() in inputs:
@@ -47,26 +44,7 @@ def check_preview(preview: Path, folder: Path) -> None:
     Raises:
         OutputError: Not a .png, or an unwritable place.
     """
-    if preview.parent.absolute() == folder.absolute() and not folder.exists():
-        _check_folder(folder)
-        preview = _nearest(folder) / preview.name
-    check_writable(preview, (".png",))
-
-
-def _nearest(folder: Path) -> Path:
-    return next(parent for parent in (folder, *folder.absolute().parents) if parent.exists())
-
-
-def _check_folder(folder: Path) -> None:
-    """Find out whether a folder exists or can be made."""
-    nearest = _nearest(folder)
-    if not nearest.is_dir():
-        raise OutputError(f"{folder}: {nearest} is a file, not a folder; choose another folder with -o")
-    try:
-        with tempfile.TemporaryFile(dir=nearest):
-            pass
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot write there ({error.strerror}); choose another folder with -o") from error
+    check_writable(preview, (".png",), new_folder=preview.parent.absolute() == folder.absolute())
 
 
 def make_folder(folder: Path) -> None:

@@ -1,6 +1,7 @@
 """`n2n reconstruct | denoise | upsample`: read, fit or load, do the task, write, tell."""
 
 import argparse
+import re
 import time
 import warnings
 from collections.abc import Callable
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from n2n.tasks.field import Field
 
 _RESOLUTIONS = (8, 2048)
+_ONLY_FIT = ("datamodule", "logger", "checkpoint_every", "task", "hydra")
 
 
 def run_work(options: argparse.Namespace) -> int:
@@ -89,6 +91,9 @@ def _configure(options: argparse.Namespace, overrides: list[str]) -> dict[str, A
 
     if options.shape:
         raise ConfigError(f"--shape {options.shape} chooses a shape of a run; give the run with --run")
+    for text in overrides:
+        if (key := re.split(r"[.=]", text.lstrip("+~"))[0]) in _ONLY_FIT:
+            raise ConfigError(f"{text} has no effect here: {key} belongs to runs that are kept; use it with `n2n fit`")
     config = compose([f"task={options.command}", f"device={options.device}", f"seed={options.seed}", *overrides])
     pick_device(config["device"])
     options.seed = config["seed"]
@@ -101,6 +106,8 @@ def _fit(options: argparse.Namespace, inputs: list[Input], config: dict[str, Any
     with progress_bar("fitting", options.quiet) as report:
         field = fit_clouds([item.points for item in inputs], config, report=report)
     facts = field.report
+    if facts["left_out"][0]:
+        say(f"{facts['left_out'][0]:,} repeated or far-off points did not take part in the fit", options.quiet)
     several = f" in {facts['observations'][0]} observations" if facts["observations"][0] > 1 else ""
     say(
         f"{facts['points'][0]:,} points{several}: noise {facts['noise'][0]:.3g}, spacing {facts['spacing'][0]:.3g} "

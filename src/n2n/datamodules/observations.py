@@ -1,5 +1,6 @@
 """The data of a fit: noisy observations of one or several shapes, in unit coordinates, drawn in pairs."""
 
+import hashlib
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,8 +12,7 @@ from torch.utils.data import DataLoader, IterableDataset
 
 from n2n.errors import InputError
 from n2n.geometry.frame import Frame
-
-PAIRS = ("random", "same")
+from n2n.geometry.outliers import usable
 
 
 @dataclass
@@ -20,7 +20,7 @@ class Draw:
     """One pair (i, j) of observations of one shape (Eq. 5).
 
     Attributes:
-        source, target: N_i and N_j, (n, 3) unit coordinates; several observations merged where they are small.
+        source, target: N_i and N_j, (n, 3) unit coordinates; with i = j several observations, merged.
         same: i = j.
         key: Names N_i while it is a single observation, so that what only depends on it is computed once.
         condition: Which shape.
@@ -38,7 +38,8 @@ class ObservationsDataModule(L.LightningDataModule):
 
     Attributes:
         frames: One world <-> unit map per shape.
-        shapes: Per shape its observations, (n_i, 3) float32 unit coordinates.
+        shapes: Per shape its observations, (n_i, 3) float32 unit coordinates; repeated and far-off points left out.
+        left_out: Per shape how many points those were.
 
     Args:
         shapes: Per shape its observations, (n_i, 3) float64 world coordinates; point counts may differ.
@@ -49,13 +50,16 @@ class ObservationsDataModule(L.LightningDataModule):
         super().__init__()
         if not shapes or not all(shapes):
             raise InputError("no observations given; pass at least one noisy point cloud")
-        self.frames, self.shapes = [], []
+        self.frames, self.shapes, self.left_out = [], [], []
         for clouds in shapes:
             used = clouds if num_observations is None else clouds[:num_observations]
             if num_observations is not None and len(used) < num_observations:
                 raise InputError(
                     f"num_observations={num_observations}, but only {len(used)} given; add observations or lower it"
                 )
+            kept = [cloud[usable(cloud)] for cloud in used]
+            self.left_out.append(sum(map(len, used)) - sum(map(len, kept)))
+            used = kept
             frame = Frame.fit(used)
             self.frames.append(frame)
             self.shapes.append([torch.as_tensor(frame.to_unit(c), dtype=torch.float32) for c in used])
@@ -66,12 +70,21 @@ class ObservationsDataModule(L.LightningDataModule):
 
         Args:
             pairs: `random` (i and j independent, as in Eq. 5) or `same` (i = j).
-            points: Observations are merged until a draw holds this many points.
+            points: With i = j, observations are merged until a draw holds this many points.
             seed: Of the draws.
             first: Iteration to start at (a resumed fit).
             step: Iterations per draw.
         """
         self._blocks = {"pairs": pairs, "points": points, "seed": seed, "first": first, "step": step}
+
+    def fingerprint(self) -> str:
+        """Return 16 hex digits that name the data by content."""
+        digest = hashlib.sha256()
+        for frame, clouds in zip(self.frames, self.shapes, strict=True):
+            digest.update(repr((frame, [len(cloud) for cloud in clouds])).encode())
+            for cloud in clouds:
+                digest.update(cloud.numpy().tobytes())
+        return digest.hexdigest()[:16]
 
     def train_dataloader(self) -> DataLoader:
         return DataLoader(_Draws(self.shapes, **self._blocks), batch_size=None)
@@ -100,9 +113,10 @@ class _Draws(IterableDataset):
         random = np.random.default_rng([self.seed, iteration])
         condition = int(random.integers(len(self.shapes)))
         clouds = self.shapes[condition]
-        count = min(len(clouds), max(1, -(-self.points // min(map(len, clouds)))))
+        merged = self.pairs == "same"
+        count = min(len(clouds), -(-self.points // min(map(len, clouds)))) if merged else 1
         first = random.choice(len(clouds), count, replace=False)
-        second = first if self.pairs == "same" or len(clouds) == 1 else random.choice(len(clouds), count, replace=False)
+        second = first if merged or len(clouds) == 1 else random.choice(len(clouds), 1)
         same = bool((first == second).all())
         source = _merge([clouds[i] for i in first])
         target = source if same else _merge([clouds[j] for j in second])

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
+import torch
 from hydra.utils import instantiate
 
 from n2n.architectures.base import SDF
@@ -20,7 +21,7 @@ def build_field(config: dict[str, Any], num_conditions: int) -> SDF:
 
 def build_objective(config: dict[str, Any], guides: list[Guide | None]) -> Objective:
     """Build Eq. 7: distance, pairing, queries, lambda R and the further terms."""
-    terms = {"regulariser": (config["regulariser_weight"], _checked(REGULARISERS.build, config["regulariser"]))}
+    terms = {"regulariser": (config["regulariser_weight"] or 0.0, _checked(REGULARISERS.build, config["regulariser"]))}
     for key, spec in config["terms"].items():
         if spec is None:
             continue
@@ -38,10 +39,10 @@ def build_objective(config: dict[str, Any], guides: list[Guide | None]) -> Objec
 def build_optimizer(config: dict[str, Any]) -> tuple[Callable[..., Any], Callable[..., Any]]:
     """Return the optimiser and scheduler as functions of what they act on."""
     try:
-        return (
-            instantiate({**config["optimizer"], "_partial_": True}),
-            instantiate({**config["scheduler"], "_partial_": True}),
-        )
+        optimizer, scheduler = (instantiate({**config[key], "_partial_": True}) for key in ("optimizer", "scheduler"))
+        # Tried out now: a wrong value must not end in the middle of a fit.
+        scheduler(optimizer([torch.nn.Parameter(torch.zeros(1))]), config["iterations"])
+        return optimizer, scheduler
     except Exception as error:
         raise ConfigError(f"optimizer or scheduler cannot be built: {error}") from error
 
@@ -50,6 +51,6 @@ def _checked(build: Callable[..., Any], spec: Any, **extra: Any) -> Any:
     """Turn a component's own complaint about an argument's value into an error the user can act on."""
     try:
         return build(spec, **extra)
-    except ValueError as error:
+    except (ValueError, TypeError) as error:
         name = spec if isinstance(spec, str) else spec.get("name")
         raise ConfigError(f"{name}: {error}") from error

@@ -24,6 +24,7 @@ _THIN_PLATE = 8e-3
 _MAX_CELLS = 3e6  # a whole street in one grid would need more; it gets a coarser one instead
 _BAND_VOXELS = 3.0
 _MAX_BATCH = 32_768
+_GLOBAL_BATCH = 1000  # matched as one leaf: its cost grows with the cube
 _PLAN_REUSE = 20
 _GRID_ITERATIONS, _GRID_RATE = 160, 0.02
 _NETWORK_ITERATIONS, _NETWORK_RATE = 2000, 5e-4
@@ -63,11 +64,12 @@ class Chosen:
         stiffness = (_STIFFNESS * self.noise) ** 2
         # The weights balance a squared distance; a distance of exponent 1 is larger by 1 / noise.
         unit = self.noise ** (config["distance"].get("p", 1) - 2)
+        unsorted = config["pairing"].get("name") == "global"
         linear = config["architecture"].get("name") == "grid"
         return {
             "iterations": _GRID_ITERATIONS if linear else _NETWORK_ITERATIONS,
             "optimizer.lr": _GRID_RATE if linear else _NETWORK_RATE,
-            "batch_size": self.batch_size,
+            "batch_size": min(self.batch_size, _GLOBAL_BATCH) if unsorted else self.batch_size,
             "plan_reuse": self.plan_reuse,
             "queries.kind": "neighbour" if self.observations == 1 else "observation",
             "queries.scale": 0.5 * self.noise,

@@ -14,6 +14,7 @@ import torch
 from lightning.pytorch.callbacks import ModelCheckpoint
 
 from n2n.architectures.base import SDF
+from n2n.compose import config_hash
 from n2n.config import AUTO
 from n2n.datamodules.observations import ObservationsDataModule
 from n2n.errors import ConfigError
@@ -24,6 +25,7 @@ from n2n.fitting.prepare import fill_config, prepare
 from n2n.geometry.frame import Frame
 
 LAST_CHECKPOINT = "last.ckpt"
+_LOGGED = 1000  # rows of the log, at most twice as many
 
 
 @dataclass
@@ -71,11 +73,12 @@ def fit(
     objective = build_objective(config, [shape.guide(device, seed) for shape in shapes])
     optimizer, scheduler = build_optimizer(config)
     iterations, plan_reuse = config["iterations"], config["plan_reuse"]
-    module = FitModule(field, objective, optimizer, scheduler, iterations, plan_reuse, seed)
+    identity = config_hash({**config, "device": None, "data": data.fingerprint()})
+    module = FitModule(field, objective, optimizer, scheduler, iterations, plan_reuse, seed, identity)
     prepared = time.perf_counter()
 
     resume = _resume_from(run_dir)
-    first = _iteration_of(resume) if resume else 0
+    first = _iteration_of(resume, identity) if resume else 0
     data.configure_draws(config["pairs"], config["batch_size"], seed, first, plan_reuse)
     callbacks: list[L.Callback] = [ProgressReport(report)] if report else []
     if run_dir:
@@ -96,7 +99,7 @@ def fit(
             enable_progress_bar=False,
             enable_model_summary=False,
             inference_mode=False,
-            log_every_n_steps=1,
+            log_every_n_steps=max(1, iterations // plan_reuse // _LOGGED),
             num_sanity_val_steps=0,
         )
         if first < iterations:
@@ -114,9 +117,10 @@ def fit(
             "device": str(device),
             "points": [sum(len(c) for c in clouds) for clouds in data.shapes],
             "observations": [len(clouds) for clouds in data.shapes],
-            "noise": [s.chosen.noise * f.scale for s, f in zip(shapes, data.frames, strict=True)],
+            "left_out": data.left_out,
+            "noise": [s.scales.noise * f.scale for s, f in zip(shapes, data.frames, strict=True)],
             "spacing": [s.chosen.spacing * f.scale for s, f in zip(shapes, data.frames, strict=True)],
-            "losses": {name: float(value) for name, value in trainer.callback_metrics.items()},
+            "losses": {name: float(value) for name, value in trainer.callback_metrics.items() if name != "step"},
             "seconds_prepare": round(prepared - start, 2),
             "seconds_fit": round(time.perf_counter() - prepared, 2),
         },
@@ -167,5 +171,11 @@ def _resume_from(run_dir: Path | None) -> Path | None:
     return checkpoint if checkpoint and checkpoint.exists() else None
 
 
-def _iteration_of(checkpoint: Path) -> int:
-    return int(torch.load(checkpoint, weights_only=True, map_location="cpu")["global_step"])
+def _iteration_of(checkpoint: Path, identity: str) -> int:
+    state = torch.load(checkpoint, weights_only=True, map_location="cpu")
+    if state.get("identity") != identity:
+        raise ConfigError(
+            f"{checkpoint.parent} holds a fit of other points or with other settings; "
+            "choose another folder, or delete this one"
+        )
+    return int(state["global_step"])

@@ -23,6 +23,7 @@ class FitModule(L.LightningModule):
         plan_reuse: Optimiser steps per matching, >= 1.
         seed: Every block draws from a generator of its own, seeded by this and its first iteration, so a resumed fit
             draws what an undisturbed one would have drawn.
+        identity: Names data and configuration in checkpoints, so that only the same fit is resumed.
     """
 
     def __init__(
@@ -34,16 +35,20 @@ class FitModule(L.LightningModule):
         iterations: int,
         plan_reuse: int = 1,
         seed: int = 0,
+        identity: str = "",
     ) -> None:
         super().__init__()
         self.automatic_optimization = False
         self.field, self.objective = field, objective
         self._optimizer, self._scheduler = optimizer, scheduler
-        self.iterations, self.plan_reuse, self.seed = iterations, plan_reuse, seed
+        self.iterations, self.plan_reuse, self.seed, self.identity = iterations, plan_reuse, seed, identity
 
     def configure_optimizers(self) -> dict[str, Any]:
         optimizer = self._optimizer(self.field.parameters())
         return {"optimizer": optimizer, "lr_scheduler": self._scheduler(optimizer, self.iterations)}
+
+    def on_save_checkpoint(self, checkpoint: dict[str, Any]) -> None:
+        checkpoint["identity"] = self.identity
 
     def training_step(self, draw: Draw, batch_idx: int) -> None:
         first = self.global_step
@@ -57,4 +62,5 @@ class FitModule(L.LightningModule):
                 self.manual_backward(loss)
             optimizer.step()
             scheduler.step()
-        self.log_dict({"loss": loss.detach(), **parts}, batch_size=1)
+        # Lightning would count blocks; `step` is its name for the x axis of every logger.
+        self.log_dict({"loss": loss.detach(), **parts, "step": float(self.global_step)}, batch_size=1)

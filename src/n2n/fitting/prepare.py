@@ -12,6 +12,7 @@ from n2n.architectures.base import SDF
 from n2n.datamodules.observations import ObservationsDataModule
 from n2n.fitting.auto import Chosen, choose, fill, measure
 from n2n.geometry.scaffold import Scaffold
+from n2n.geometry.scale import Scales
 from n2n.losses.state import Guide
 
 
@@ -21,12 +22,14 @@ class Shape:
 
     Attributes:
         observations: (n_i, 3) each, unit coordinates.
-        chosen: What their noise and spacing decided.
+        scales: Their noise and spacing, as measured.
+        chosen: What these decided.
         sample: (m, 3), some of all their points.
         scaffold: Oriented local fit, where the recipe wants one.
     """
 
     observations: list[torch.Tensor]
+    scales: Scales
     chosen: Chosen
     sample: NDArray[np.float64]
     scaffold: Scaffold | None
@@ -57,7 +60,7 @@ def prepare(data: ObservationsDataModule, config: dict[str, Any]) -> list[Shape]
         arrays = [cloud.double().numpy() for cloud in clouds]
         scales, sample = measure(arrays, config["seed"])
         scaffold = Scaffold.build(sample, scales, config["seed"]) if config["scaffold"] else None
-        shapes.append(Shape(clouds, choose(scales, arrays), sample, scaffold))
+        shapes.append(Shape(clouds, scales, choose(scales, arrays), sample, scaffold))
     return shapes
 
 

@@ -37,12 +37,13 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def check_writable(path: str | Path, extensions: Iterable[str]) -> None:
+def check_writable(path: str | Path, extensions: Iterable[str], new_folder: bool = False) -> None:
     """Find out before a long computation whether a result can be written.
 
     Args:
         path: Output file.
         extensions: What can be written, with dots, lower case.
+        new_folder: Whether a missing folder will be made by then; found out is then whether it can be.
 
     Raises:
         OutputError: Unknown extension, missing folder, a folder in the way, or no permission.
@@ -54,14 +55,20 @@ def check_writable(path: str | Path, extensions: Iterable[str]) -> None:
         raise OutputError(
             f"{path}: cannot write files ending in {path.suffix or 'nothing'!r};{hint} choose one of: {known}"
         )
-    if path.is_dir():
-        raise OutputError(f"{path}: is a folder; give a file name")
-    if not path.parent.is_dir():
-        raise OutputError(f"{path}: the folder {path.parent} does not exist; create it first")
     try:
-        with tempfile.TemporaryFile(dir=path.parent):
+        if path.is_dir():
+            raise OutputError(f"{path}: is a folder; give a file name")
+        folder = path.parent
+        if new_folder:
+            folder = next(parent for parent in (folder, *folder.absolute().parents) if parent.exists())
+            if not folder.is_dir():
+                raise OutputError(f"{path}: {folder} is a file, not a folder; choose another folder with -o")
+        elif not folder.is_dir():
+            raise OutputError(f"{path}: the folder {folder} does not exist; create it first")
+        with tempfile.TemporaryFile(dir=folder):
             pass
+        is_locked = path.exists() and not os.access(path, os.W_OK)
     except OSError as error:
         raise OutputError(f"{path}: cannot write there ({error.strerror}); choose another folder with -o") from error
-    if path.exists() and not os.access(path, os.W_OK):
+    if is_locked:
         raise OutputError(f"{path}: exists and is read-only; choose another name")

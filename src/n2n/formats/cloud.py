@@ -28,15 +28,18 @@ class Cloud:
         """Return which rows have finite coordinates, (n,)."""
         return np.isfinite(self.points).all(axis=1)
 
-    def columns(self) -> dict[str, NDArray[Any]]:
-        """Return the attributes as (n,) columns of numbers, (n, k) arrays split into name_0 ... name_(k-1).
+    def columns(self, texts: bool = False) -> dict[str, NDArray[Any]]:
+        """Return the attributes as (n,) columns, (n, k) arrays split into name_0 ... name_(k-1).
 
-        Texts and dates are left out: only .npz holds them. An attribute called like a coordinate gets an underscore.
+        An attribute called like a coordinate gets an underscore. Dates are left out: only .npz holds them.
+
+        Args:
+            texts: Whether texts are wanted, too; text files hold them.
         """
         flat = {}
         for name, values in self.attributes.items():
             values = np.asarray(values)
-            if values.dtype.kind not in "biuf":
+            if values.dtype.kind not in ("biufU" if texts else "biuf"):
                 continue
             if values.ndim == 1:
                 flat[f"{name}_" if name.lower() in ("x", "y", "z") else name] = values

@@ -1,5 +1,6 @@
 """One table from file extension to reader and writer, and one place where their failures become messages."""
 
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -27,6 +28,7 @@ _WRITERS: dict[str, Callable[[Path, Cloud], None]] = {
     ".pcd": pcd.write,
     **dict.fromkeys((".las", ".laz"), las.write),
 }
+_HOLD_TEXTS = (".xyz", ".txt", ".csv", ".pts", ".asc", ".npz")
 CLOUD_EXTENSIONS_READ = tuple(_READERS)
 CLOUD_EXTENSIONS_WRITE = tuple(_WRITERS)
 
@@ -41,10 +43,13 @@ def read_cloud(path: str | Path) -> Cloud:
         InputError: Missing or empty file, unknown extension, or content that does not fit the extension.
     """
     path = Path(path)
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder; give a point cloud file")
-    if not path.exists():
-        raise InputError(f"{path}: no such file")
+    try:
+        if path.is_dir():
+            raise InputError(f"{path}: is a folder; give a point cloud file")
+        if not path.exists():
+            raise InputError(f"{path}: no such file")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
         hint = suggest(path.suffix.lower(), list(_READERS)).split(" Known")[0]
@@ -72,6 +77,9 @@ def read_cloud(path: str | Path) -> Cloud:
 def write_cloud(path: str | Path, cloud: Cloud) -> None:
     """Write a cloud in the format of the extension; the file appears whole or not at all.
 
+    Warns:
+        UserWarning: The format has no place for attributes that are texts.
+
     Raises:
         OutputError: Unknown extension, or writing failed.
     """
@@ -81,3 +89,9 @@ def write_cloud(path: str | Path, cloud: Cloud) -> None:
         raise OutputError(f"{path}: unknown file type {path.suffix!r}; choose one of: {', '.join(_WRITERS)}")
     with atomic_path(path) as temporary:
         writer(temporary, cloud)
+    texts = [name for name, values in cloud.attributes.items() if values.dtype.kind == "U"]
+    if texts and path.suffix.lower() not in _HOLD_TEXTS:
+        warnings.warn(
+            f"{path.suffix[1:]} cannot store texts: {', '.join(texts)} left out; write csv or npz to keep them",
+            stacklevel=2,
+        )

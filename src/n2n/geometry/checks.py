@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from n2n.errors import InputError
 
 MIN_POINTS = 100
-_FLATNESS = 1e-9
+_FLATNESS = 1e-5  # of the extent; a line stored in single precision, or with six digits, is this crooked
 
 
 def check_cloud(points: NDArray[np.float64], name: str) -> NDArray[np.float64]:
@@ -19,6 +19,12 @@ def check_cloud(points: NDArray[np.float64], name: str) -> NDArray[np.float64]:
     Raises:
         InputError: Wrong shape, not finite, fewer than 100 distinct points, all equal, or on one line.
     """
+    count_distinct(points, name)
+    return points
+
+
+def count_distinct(points: NDArray[np.float64], name: str) -> int:
+    """Check as `check_cloud` does; return how many different points there are."""
     if points.ndim != 2 or points.shape[1] != 3:
         raise InputError(f"{name}: expected an array of shape (n, 3), got {points.shape}")
     if not np.isfinite(points).all():
@@ -26,7 +32,8 @@ def check_cloud(points: NDArray[np.float64], name: str) -> NDArray[np.float64]:
         raise InputError(f"{name}: {count} of {len(points)} points are NaN or infinite; remove them first")
     if len(points) < MIN_POINTS:
         raise InputError(f"{name}: {len(points)} points are too few for a surface; at least {MIN_POINTS} are needed")
-    distinct = len(np.unique(points, axis=0))
+    ordered = points[np.lexsort(points.T)]
+    distinct = 1 + int((ordered[1:] != ordered[:-1]).any(axis=1).sum())
     if distinct == 1:
         raise InputError(f"{name}: all {len(points)} points are equal; this is not a surface")
     if distinct < MIN_POINTS:
@@ -36,4 +43,4 @@ def check_cloud(points: NDArray[np.float64], name: str) -> NDArray[np.float64]:
     extent = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     if extent[1] <= _FLATNESS * extent[0]:
         raise InputError(f"{name}: all points lie on one line; a surface needs points in two directions at least")
-    return points
+    return distinct

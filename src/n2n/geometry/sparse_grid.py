@@ -71,7 +71,7 @@ class SparseGrid:
         with torch.no_grad():
             for start in range(0, len(positions), _CHUNK):
                 part = torch.as_tensor(self.world(positions[start : start + _CHUNK]))
-                values[start : start + _CHUNK] = self._field(part).double().cpu().numpy()
+                values[start : start + _CHUNK] = self._field(part).cpu().double().numpy()
         self.evaluations += len(positions)
         broken = ~np.isfinite(values)
         if broken.any():

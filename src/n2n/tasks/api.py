@@ -5,18 +5,22 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+import torch
+from numpy.typing import ArrayLike, NDArray
 
 from n2n.compose import compose
 from n2n.datamodules.observations import ObservationsDataModule
+from n2n.errors import InputError
 from n2n.fitting.callbacks import Report
 from n2n.fitting.fit import fit as fit_data
 from n2n.geometry.checks import check_cloud
 from n2n.tasks.field import Field
 
+_EXPECTED = "an array of shape (n, 3), or a list of such arrays"
+
 
 def fit(
-    points: NDArray[np.float64] | Sequence[NDArray[np.float64]],
+    points: ArrayLike | Sequence[ArrayLike],
     recipe: str = "fast",
     device: str = "auto",
     seed: int = 0,
@@ -27,7 +31,8 @@ def fit(
     """Learn a signed distance field from one or several noisy observations of one shape.
 
     Args:
-        points: (n, 3) world coordinates, n >= 100, or a list of such arrays (point counts may differ).
+        points: (n, 3) world coordinates, n >= 100, or a list of such arrays (point counts may differ). Arrays, torch
+            tensors and lists of numbers are arrays here.
         recipe: `fast` (seconds) or `paper` (the paper's settings; days on a CPU).
         device: auto | cpu | cuda | mps.
         seed: Seed of everything random.
@@ -39,10 +44,32 @@ def fit(
         InputError: A cloud is too small, flat on a line, or not finite.
         ConfigError: An unknown recipe or setting.
     """
-    clouds = [points] if isinstance(points, np.ndarray) and points.ndim == 2 else list(points)
-    clouds = [check_cloud(np.asarray(cloud, np.float64), f"points[{i}]") for i, cloud in enumerate(clouds)]
+    clouds = [check_cloud(cloud, f"points[{i}]") for i, cloud in enumerate(_clouds(points))]
     config = compose([f"recipe={recipe}", f"device={device}", f"seed={seed}", *overrides])
     return fit_clouds(clouds, config, run_dir, report)
+
+
+def _clouds(points: Any) -> list[NDArray[np.float64]]:
+    """Return the observations as arrays, one or several."""
+    try:
+        if hasattr(points, "__array__"):
+            whole = _array(points)
+            clouds = [whole] if whole.ndim == 2 else list(whole)
+        else:
+            clouds = [_array(part) for part in points]
+            if clouds and all(part.ndim == 1 for part in clouds):
+                # The rows of one cloud.
+                clouds = [np.array(clouds)]
+    except (ValueError, TypeError) as error:
+        raise InputError(f"points: cannot be read as numbers ({error}); give {_EXPECTED}") from error
+    if any(cloud.ndim != 2 for cloud in clouds):
+        raise InputError(f"points: got {np.ndim(clouds[0])}-dimensional parts; give {_EXPECTED}")
+    return clouds
+
+
+def _array(part: Any) -> NDArray[np.float64]:
+    part = part.detach().cpu() if isinstance(part, torch.Tensor) else part
+    return np.asarray(part, np.float64)
 
 
 def fit_clouds(

@@ -14,11 +14,13 @@ from n2n.architectures.base import SDF
 from n2n.errors import InputError
 from n2n.fitting.assemble import build_field
 from n2n.fitting.fit import FitResult, pick_device
+from n2n.formats.atomic import atomic_path
 from n2n.geometry.frame import Frame
 from n2n.tasks.points import denoise_points, upsample_points
-from n2n.tasks.surface import reconstruct_surface
+from n2n.tasks.surface import field_box, reconstruct_surface
 
 FIELD_FILE = "field.ckpt"
+_MOSTLY = 0.5
 
 
 @dataclass
@@ -61,14 +63,19 @@ class Field:
         return reconstruct_surface(self.sdf, self.frames[shape], self.config, resolution, edge, shape, keep_all)
 
     def denoise(self, points: NDArray[np.float64], shape: int = 0) -> NDArray[np.float64]:
-        """Pull (n, 3) noisy points onto the surface; number and order are kept."""
-        return denoise_points(self.sdf, self.frames[shape], _points(points), shape)
+        """Pull (n, 3) noisy points onto the surface; number and order are kept.
+
+        Raises:
+            InputError: Most points lie where the field knows nothing: they are another cloud's.
+        """
+        return denoise_points(self.sdf, self.frames[shape], self._near(points, shape), shape, self.config["pulls"])
 
     def upsample(
         self, points: NDArray[np.float64], rate: int = 4, seed: int = 0, shape: int = 0
     ) -> NDArray[np.float64]:
         """Return (rate * n, 3) points on the surface: the n denoised points, then rate - 1 perturbed copies, pulled."""
-        return upsample_points(self.sdf, self.frames[shape], _points(points), rate, seed, shape)
+        near, pulls = self._near(points, shape), self.config["pulls"]
+        return upsample_points(self.sdf, self.frames[shape], near, rate, seed, shape, pulls)
 
     def sdf_at(self, points: NDArray[np.float64], shape: int = 0) -> NDArray[np.float64]:
         """Return signed distances (n,) in world units at (n, 3) positions, inside negative."""
@@ -76,7 +83,19 @@ class Field:
         with torch.no_grad():
             unit = torch.as_tensor(frame.to_unit(_points(points)), dtype=torch.float32, device=self.device)
             codes = torch.full((len(unit),), shape, dtype=torch.long, device=self.device)
-            return self.sdf(unit, codes).double().cpu().numpy() * frame.scale
+            return self.sdf(unit, codes).cpu().double().numpy() * frame.scale
+
+    def _near(self, points: NDArray[np.float64], shape: int) -> NDArray[np.float64]:
+        """Return the points, after a check that they are where the field was fitted."""
+        points = _points(points)
+        lower, upper = (self.frames[shape].to_world(corner) for corner in field_box(self.config))
+        inside = ((points >= lower) & (points <= upper)).all(axis=1)
+        if inside.sum() < _MOSTLY * len(points):
+            raise InputError(
+                f"{np.count_nonzero(~inside):,} of {len(points):,} points lie outside the box the field was fitted in, "
+                f"{_corner(lower)} to {_corner(upper)}; give the cloud it was fitted to, or fit this one"
+            )
+        return points
 
     @property
     def device(self) -> torch.device:
@@ -87,17 +106,14 @@ class Field:
         """Write the field into a run folder as plain numbers and tensors; return the file."""
         path = Path(run_dir) / FIELD_FILE
         path.parent.mkdir(parents=True, exist_ok=True)
-        temporary = path.with_suffix(".tmp")
-        torch.save(
-            {
-                "config": self.config,
-                "frames": [frame.state() for frame in self.frames],
-                "report": self.report,
-                "weights": self.sdf.state_dict(),
-            },
-            temporary,
-        )
-        temporary.replace(path)
+        state = {
+            "config": self.config,
+            "frames": [frame.state() for frame in self.frames],
+            "report": self.report,
+            "weights": self.sdf.state_dict(),
+        }
+        with atomic_path(path) as temporary:
+            torch.save(state, temporary)
         return path
 
     @classmethod
@@ -119,6 +135,10 @@ class Field:
             reason = (str(error) or type(error).__name__).splitlines()[0]
             raise InputError(f"{path} cannot be read as an n2n field ({reason}); fit again") from error
         return cls(sdf.eval().to(pick_device(device)), frames, state["config"], state["report"])
+
+
+def _corner(position: NDArray[np.float64]) -> str:
+    return "(" + ", ".join(f"{x:.6g}" for x in position) + ")"
 
 
 def _points(points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -10,17 +10,16 @@ from n2n.errors import InputError
 from n2n.geometry.frame import Frame
 from n2n.geometry.pull import pull
 
-_PULLS = 3
 _CHUNK = 100_000
 
 
-def denoise_points(sdf: SDF, frame: Frame, points: NDArray[np.float64], shape: int = 0) -> NDArray[np.float64]:
+def denoise_points(
+    sdf: SDF, frame: Frame, points: NDArray[np.float64], shape: int = 0, pulls: int = 3
+) -> NDArray[np.float64]:
     """Pull world points (n, 3) onto the surface.
 
-    The pull is repeated, because a learned f is a distance only to first order: the first pull leaves about a tenth of
-    the way, the second a hundredth.
-
-    Source: Ma et al. 2023, Eq. 3 and Sec. 4.1.
+    Source: Ma et al. 2023, Eq. 3 and Sec. 4.1. Differs: the pull may be repeated, as a learned f is a distance only
+    to first order: the first pull leaves about a tenth of the way, the second a hundredth. The paper pulls once.
     """
     device = next(sdf.parameters()).device
     unit = frame.to_unit(points)
@@ -29,14 +28,14 @@ def denoise_points(sdf: SDF, frame: Frame, points: NDArray[np.float64], shape: i
         for start in range(0, len(unit), _CHUNK):
             part = torch.as_tensor(unit[start : start + _CHUNK], dtype=torch.float32, device=device)
             codes = torch.full((len(part),), shape, dtype=torch.long, device=device)
-            for _ in range(_PULLS):
+            for _ in range(pulls):
                 part = pull(part, *sdf.value_and_gradient(part, codes))
-            moved[start : start + _CHUNK] = part.double().cpu().numpy()
+            moved[start : start + _CHUNK] = part.cpu().double().numpy()
     return frame.to_world(moved)
 
 
 def upsample_points(
-    sdf: SDF, frame: Frame, points: NDArray[np.float64], rate: int, seed: int = 0, shape: int = 0
+    sdf: SDF, frame: Frame, points: NDArray[np.float64], rate: int, seed: int = 0, shape: int = 0, pulls: int = 3
 ) -> NDArray[np.float64]:
     """Return (rate * n, 3) world points on the surface.
 
@@ -50,11 +49,11 @@ def upsample_points(
     """
     if rate < 1:
         raise InputError(f"rate must be at least 1, got {rate}")
-    clean = denoise_points(sdf, frame, points, shape)
+    clean = denoise_points(sdf, frame, points, shape, pulls)
     if len(clean) < 2:
         return np.repeat(clean, rate, axis=0)
     spacing = cKDTree(clean).query(clean, 2)[0][:, 1:]
     gap = np.maximum(spacing, np.median(spacing))
     random = np.random.default_rng(seed)
     copies = [clean + gap * random.standard_normal(clean.shape) for _ in range(rate - 1)]
-    return np.concatenate([clean, *(denoise_points(sdf, frame, copy, shape) for copy in copies)])
+    return np.concatenate([clean, *(denoise_points(sdf, frame, copy, shape, pulls) for copy in copies)])

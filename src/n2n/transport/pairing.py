@@ -26,11 +26,10 @@ class GlobalPairing:
     def __call__(
         self, queries: Points, targets: Float[Tensor, "m 3"], generator: torch.Generator, same: bool = False
     ) -> tuple[LeafIndex, LeafIndex]:
-        """Draw the subsets; see `StratifiedPairing.__call__`."""
+        """Draw the subsets, always independently; see `StratifiedPairing.__call__`."""
         size = min(self.batch_size, len(queries), len(targets))
         first = _draw(len(queries), size, generator, queries.device)
-        second = first if same else _draw(len(targets), size, generator, targets.device)
-        return first[None], second[None]
+        return first[None], _draw(len(targets), size, generator, targets.device)[None]
 
 
 class StratifiedPairing:

@@ -65,9 +65,26 @@ def test_one_observation_is_paired_with_itself():
 
 def test_small_observations_are_merged_until_a_draw_holds_enough():
     data = _data(60, 60, 60, 60)
-    for draw in _draws(data, points=150):
+    for draw in _draws(data, points=150, pairs="same"):
         assert len(draw.source) == len(draw.target) == 180 and draw.key is None
-    assert all(len(draw.source) == 240 for draw in _draws(data, points=10_000))
+    assert all(len(draw.source) == 240 for draw in _draws(data, points=10_000, pairs="same"))
+
+
+def test_a_random_pair_is_two_observations_however_small():
+    assert all(len(draw.source) == len(draw.target) == 60 for draw in _draws(_data(60, 60, 60), points=150))
+
+
+def test_repeated_and_far_points_take_no_part():
+    cloud = np.random.default_rng(0).normal(size=(300, 3))
+    cloud /= np.linalg.norm(cloud, axis=1, keepdims=True)
+    data = ObservationsDataModule([[np.concatenate([cloud, cloud[:50], [[900.0, 0, 0]]])]])
+    assert data.left_out == [51] and len(data.shapes[0][0]) == 300
+    assert data.frames[0].scale < 1.1
+
+
+def test_the_fingerprint_is_of_the_content():
+    assert _data(60).fingerprint() == _data(60).fingerprint()
+    assert _data(60).fingerprint() != _data(61).fingerprint()
 
 
 @pytest.mark.parametrize("counts", [(200, 20, 20, 20), (20, 20, 20, 200)])

@@ -7,6 +7,7 @@ import torch
 
 from n2n.compose import compose
 from n2n.datamodules.observations import ObservationsDataModule
+from n2n.errors import ConfigError
 from n2n.fitting.fit import LAST_CHECKPOINT, fit
 from n2n.geometry.shapes import scan
 
@@ -42,8 +43,7 @@ def _stop_at(iteration):
 
 
 def _interrupted(config, run_dir, iteration, data=None):
-    # Lightning turns Ctrl-C into an exit of its own.
-    with pytest.raises((KeyboardInterrupt, SystemExit)):
+    with pytest.raises(KeyboardInterrupt):
         fit(data or _data(), config, run_dir, _stop_at(iteration))
 
 
@@ -122,3 +122,13 @@ def test_nothing_is_written_without_a_run_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     fit(_data(1), compose(["iterations=10", "plan_reuse=5", "device=cpu"]))
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("iteration", [20, 40])
+def test_a_fit_of_other_points_or_settings_is_not_resumed(tmp_path, iteration):
+    _interrupted(_config(), tmp_path, iteration)
+    others = ObservationsDataModule([[scan("sphere", 200, 0.02, seed) for seed in (7, 8)]])
+    with pytest.raises(ConfigError, match="holds a fit of other points or with other settings"):
+        fit(others, _config(), tmp_path)
+    with pytest.raises(ConfigError, match="holds a fit of other points or with other settings"):
+        fit(_data(), _config("fast", "optimizer.lr=0.01"), tmp_path)

@@ -9,13 +9,13 @@ from n2n.testing import Ball
 @pytest.fixture
 def ball():
     """A fitted field that is exactly a sphere of radius 1 around the origin of the world."""
-    return Field(Ball(0.5), [Frame((0.0, 0.0, 0.0), 2.0)], {"architecture": {"name": "ball"}})
+    return Field(Ball(0.5), [Frame((0.0, 0.0, 0.0), 2.0)], {"architecture": {"name": "ball"}, "pulls": 3})
 
 
 @pytest.fixture
 def far_ball():
     """A sphere of radius 20 m around a place in UTM coordinates."""
-    return Field(Ball(0.5), [Frame((5e5, 5e6, 100.0), 40.0)], {"architecture": {"name": "ball"}})
+    return Field(Ball(0.5), [Frame((5e5, 5e6, 100.0), 40.0)], {"architecture": {"name": "ball"}, "pulls": 3})
 
 
 @pytest.fixture

@@ -62,7 +62,7 @@ def test_utm_coordinates_come_back_to_a_tenth_of_a_millimetre(far_ball, noisy):
 
 def test_a_field_of_wrong_slope_is_pulled_more_than_once(noisy):
     # One pull would leave a tenth of the way: up to 0.015.
-    field = Field(Sloped(0.9), [Frame((0.0, 0.0, 0.0), 2.0)], {})
+    field = Field(Sloped(0.9), [Frame((0.0, 0.0, 0.0), 2.0)], {"architecture": {"name": "ball"}, "pulls": 3})
     assert np.abs(_radius(noisy) - 1).max() > 0.1
     assert np.abs(_radius(field.denoise(noisy)) - 1).max() < 5e-4
 
@@ -92,7 +92,7 @@ def test_no_points_give_no_points(ball):
 
 def test_shapes_have_their_own_surface_and_frame(noisy):
     frames = [Frame((0.0, 0.0, 0.0), 1.0), Frame((100.0, 0.0, 0.0), 10.0), Frame((0.0, 0.0, 0.0), 1.0)]
-    field = Field(Spheres(), frames, {})
+    field = Field(Spheres(), frames, {"architecture": {"name": "ball"}, "pulls": 3})
     assert np.allclose(_radius(field.denoise(noisy, shape=2)), 0.6, atol=1e-6)
     clean = field.denoise(noisy + [100, 0, 0], shape=1)
     assert np.allclose(_radius(clean, [100, 0, 0]), 4.0, atol=1e-5)
@@ -163,3 +163,10 @@ def test_arrays_of_another_shape_are_refused(ball, task):
 def test_rates_below_one_are_refused(ball, noisy, rate):
     with pytest.raises(InputError, match=f"rate must be at least 1, got {rate}"):
         ball.upsample(noisy, rate)
+
+
+def test_a_cloud_from_elsewhere_is_refused(ball, noisy):
+    with pytest.raises(InputError, match=r"400 of 400 points lie outside the box .* fit this one"):
+        ball.denoise(noisy + [100.0, 0, 0])
+    with pytest.raises(InputError, match="outside the box"):
+        ball.upsample(50 * noisy)

@@ -111,7 +111,7 @@ def test_shapes_have_their_own_surface_and_frame():
             return points.norm(dim=-1) - 0.3 * (condition + 1)
 
     frames = [Frame((0.0, 0.0, 0.0), 1.0), Frame((10.0, 0.0, 0.0), 2.0)]
-    mesh = Field(Spheres(), frames, {"architecture": {"name": "ball"}}).reconstruct(resolution=32, shape=1)
+    mesh = Field(Spheres(), frames, {"architecture": {"name": "ball"}, "pulls": 3}).reconstruct(resolution=32, shape=1)
     assert np.abs(_radius(mesh.vertices, [10, 0, 0]) - 1.2).max() < 0.01
 
 
