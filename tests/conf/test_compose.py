@@ -45,7 +45,13 @@ def test_the_result_is_plain():
         ("terms.eikonal=1", "terms.eikonal=1 is not a term; give its weight as terms.eikonal.weight=..."),
         ("datamodule=files", "datamodule.paths is not set; give it as datamodule.paths=..."),
         ("seed=x", "seed=x: Value 'x' of type 'str' could not be converted to Integer"),
-        ("seed=-1", "seed=-1 is out of range; give a number >= 0"),
+        ("seed=-1", "seed=-1 is out of range; give a whole number from 0 to 2147483647"),
+        ("seed=2147483648", "seed=2147483648 is out of range; give a whole number from 0 to 2147483647"),
+        (f"seed={10**20 - 1}", f"seed={10**20 - 1} is out of range; give a whole number from 0 to 2147483647"),
+        ("iterations=null", "iterations=null is not a number; give a number >= 1"),
+        ("batch_size=null", "batch_size=null is not a number; give a number >= 1"),
+        ("plan_reuse=null", "plan_reuse=null is not a number; give a number >= 1"),
+        ("queries.scale=null", "queries.scale=null is not a number; give a number >= 0"),
         ("iterations=soon", "iterations=soon is not a number; give a number >= 1"),
         ("iterations=1.5", "iterations=1.5 is not a whole number; give one >= 1"),
         ("batch_size=0", "batch_size=0 is out of range; give a number >= 1"),
@@ -94,6 +100,16 @@ def test_terms_can_be_dropped():
 def test_whole_numbers_may_be_written_as_1e5():
     assert compose(["iterations=1e5"])["iterations"] == 100_000
     assert isinstance(compose(["iterations=1e5"])["iterations"], int)
+
+
+def test_only_the_number_of_observations_may_be_missing():
+    assert compose(["num_observations=null"])["num_observations"] is None
+    for key in ("seed", "checkpoint_every", "queries.neighbour"):
+        assert f"{key}=null" in message(f"{key}=null")
+
+
+def test_the_largest_seed_is_one():
+    assert compose(["seed=2147483647"])["seed"] == 2**31 - 1
 
 
 def test_later_overrides_win():

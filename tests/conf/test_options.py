@@ -48,7 +48,7 @@ def test_every_regulariser_can_be_lambda_r_and_a_term():
 
 
 def test_a_regulariser_is_not_dropped_for_want_of_a_weight():
-    with pytest.raises(ConfigError, match="regulariser=eikonal needs its lambda; give it as regulariser_weight=0.1"):
+    with pytest.raises(ConfigError, match=r"regulariser=eikonal needs its lambda; give it as regulariser_weight=0.1"):
         compose(["regulariser=eikonal"])
 
 

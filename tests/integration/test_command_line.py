@@ -2,9 +2,14 @@
 
 import csv
 import json
+import re
+import signal
 import subprocess
 import sys
+import tomllib
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from types import SimpleNamespace
 
 import laspy
 import numpy as np
@@ -81,6 +86,7 @@ BAD_FILES = {
     "few.xyz": sphere(99),
     "equal.xyz": np.ones((300, 3)),
     "line.xyz": np.outer(np.arange(300.0), [1, 2, 3]),
+    "rounded_line.xyz": np.outer(np.linspace(0, 1, 300), [1, 2, 3]).astype(np.float32),
     "repeated.xyz": np.tile(sphere(50), (3, 1)),
     "gaps.xyz": np.vstack([sphere(99), np.full((500, 3), np.nan)]),
     "nothing.xyz": np.full((300, 3), np.inf),
@@ -110,6 +116,7 @@ BAD_REQUESTS = [
     (("denoise", "few.xyz", "-o", "out.xyz"), "few.xyz: 99 points are too few for a surface; at least 100 are needed"),
     (("upsample", "equal.xyz", "-o", "out.xyz"), "equal.xyz: all 300 points are equal"),
     (("reconstruct", "line.xyz", "-o", "out.ply"), "line.xyz: all points lie on one line"),
+    (("reconstruct", "rounded_line.xyz", "-o", "out.ply"), "rounded_line.xyz: all points lie on one line"),
     (("denoise", "repeated.xyz", "-o", "out.xyz"), "only 50 of 150 points are distinct; at least 100 are needed"),
     (("denoise", "gaps.xyz", "-o", "out.xyz"), "gaps.xyz (without 500 NaN or infinite rows): 99 points are too few"),
     (("denoise", "nothing.xyz", "-o", "out.xyz"), "nothing.xyz (without 300 NaN or infinite rows): 0 points are too"),
@@ -133,7 +140,9 @@ BAD_REQUESTS = [
     (("denoise", "-o", "out.xyz"), "no input file given; e.g. n2n denoise scan.ply -o ..."),
     # Outputs.
     (("denoise", "scan.xyz"), "the following arguments are required: -o/--output; see `n2n denoise --help`"),
-    (("denoise", "scan.xyz", "-o", "none/out.xyz"), "none/out.xyz: the folder none does not exist; create it first"),
+    (("denoise", "few.xyz", "-o", "none/out.xyz"), "few.xyz: 99 points are too few"),
+    (("denoise", "scan.xyz", "-o", "none/out.docx"), "none/out.docx: cannot write files ending in '.docx'"),
+    (("denoise", "scan.xyz", "-o", "noextension/out.xyz"), "noextension is a file, not a folder"),
     (("denoise", "scan.xyz", "-o", "out.docx"), "out.docx: cannot write files ending in '.docx'"),
     (("denoise", "scan.xyz", "-o", "out.bin"), "out.bin: cannot write files ending in '.bin'"),
     (("reconstruct", "scan.xyz", "-o", "out.xyz"), "out.xyz: cannot write files ending in '.xyz'"),
@@ -160,6 +169,12 @@ BAD_REQUESTS = [
     ((*DENOISE, "seed=0,1"), "'seed=0,1' gives several values where one is needed"),
     ((*DENOISE, "seed=[1"), "cannot read the setting 'seed=[1'"),
     ((*DENOISE, "--seed", "-1"), "seed=-1 is out of range"),
+    ((*DENOISE, "--seed", "99999999999999999999"), "is out of range; give a whole number from 0 to 2147483647"),
+    ((*DENOISE, "seed=2147483648"), "seed=2147483648 is out of range; give a whole number from 0 to 2147483647"),
+    (("denoise", "scan.xyz", "-o", "out.xyz", "--run", "none", "--seed", "-1"), "seed=-1 is out of range"),
+    ((*DENOISE, "iterations=null"), "iterations=null is not a number"),
+    ((*DENOISE, "plan_reuse=null"), "plan_reuse=null is not a number"),
+    ((*DENOISE, f"distance={'x' * 300}"), "Unknown distance 'xxx"),
     ((*DENOISE, "--seed", "one"), "argument --seed: invalid int value: 'one'"),
     ((*DENOISE, "--device", "gpu"), "argument --device: invalid choice: 'gpu'"),
     # Numbers.
@@ -231,7 +246,7 @@ def test_a_mistake_is_one_line_and_changes_nothing(n2n, bad_files, words, expect
 
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs a folder that nobody can write to")
-@pytest.mark.parametrize("target", ["/proc/out.xyz", "/proc/"])
+@pytest.mark.parametrize("target", ["/proc/out.xyz", "/proc/", "/proc/none/out.xyz", "/proc/none/"])
 def test_an_unwritable_place_is_found_before_the_fit(n2n, tmp_path, target):
     code, _, error = n2n("denoise", "scan.xyz", "-o", target)
     assert code == 2 and error.count("\n") == 1 and "cannot write there" in error
@@ -282,6 +297,65 @@ def test_interrupting_leaves_nothing(n2n, tmp_path, monkeypatch):
     code, _, error = n2n(*DENOISE, QUICK, "-q")
     assert code == 130 and error == "n2n: interrupted; no unfinished file was left\n"
     assert list(tmp_path.iterdir()) == [tmp_path / "scan.xyz"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="sends signals")
+def test_an_impatient_second_interruption_changes_nothing(tmp_path):
+    program = """
+import os, signal, sys
+from n2n.cli import main as module
+
+def wait(_):
+    os.kill(os.getpid(), signal.SIGINT)
+
+def tell(advice=""):
+    os.kill(os.getpid(), signal.SIGINT)
+    print("told")
+    return 130
+
+module._dispatch, module._interrupted = wait, tell
+sys.argv = ["n2n", "list"]
+sys.exit(module.main())
+"""
+    stopped = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (stopped.returncode, stopped.stdout, stopped.stderr) == (130, "told\n", "")
+
+
+def test_a_caller_keeps_its_own_interruptions(n2n, monkeypatch):
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    before = signal.getsignal(signal.SIGINT)
+    monkeypatch.setattr("n2n.cli.main._dispatch", stop)
+    assert n2n("list")[0] == 130 and signal.getsignal(signal.SIGINT) is before
+
+
+@pytest.mark.parametrize("target", ["new/deeper/out.xyz", "new/deeper/"])
+def test_missing_folders_are_made(n2n, target):
+    code, _, _ = n2n("denoise", "scan.xyz", "-o", target, "--preview", "new/deeper/picture.png", QUICK, "-q")
+    assert code == 0
+    name = "scan.xyz" if target.endswith("/") else "out.xyz"
+    assert {path.name for path in Path("new/deeper").iterdir()} == {name, "picture.png"}
+
+
+@pytest.mark.parametrize("target", ["new/deeper/out.xyz", "new/deeper/"])
+def test_a_fit_that_fails_makes_no_folder(n2n, tmp_path, monkeypatch, target):
+    def fail(*_):
+        raise ZeroDivisionError("division by zero")
+
+    monkeypatch.setattr(Field, "denoise", fail)
+    assert n2n("denoise", "scan.xyz", "-o", target, QUICK, "-q")[0] == 3
+    assert list(tmp_path.iterdir()) == [tmp_path / "scan.xyz"]
+
+
+def test_labels_that_are_texts_come_back(n2n):
+    rows = [f"{x},{y},{z},{label}" for (x, y, z), label in zip(sphere().round(6), ["wall", "roof"] * 300, strict=True)]
+    Path("labels.csv").write_text("x,y,z,label\n" + "\n".join(rows) + "\n")
+    assert n2n("denoise", "labels.csv", "-o", "clean.csv", QUICK, "-q") == (0, "", "")
+    lines = Path("clean.csv").read_text().splitlines()
+    assert lines[0] == "x,y,z,label" and [line.split(",")[3] for line in lines[1:]] == ["wall", "roof"] * 300
+    code, _, error = n2n("denoise", "labels.csv", "-o", "clean.ply", QUICK)
+    assert code == 0 and "ply cannot store texts: label left out; write csv or npz to keep them" in error
 
 
 def test_reconstruct_makes_a_closed_mesh_around_the_sphere(n2n):
@@ -353,7 +427,7 @@ def test_duplicates_are_told_and_kept(n2n):
 def test_upsample_gives_rate_times_the_points_on_the_surface_with_attributes(n2n):
     np.savetxt("labels.txt", np.column_stack([sphere(), np.arange(600)]), header="x y z label")
     code, _, error = n2n("upsample", "labels.txt", "-o", "dense.txt", "--rate", "3", QUICK)
-    dense = np.loadtxt("dense.txt", skiprows=1)
+    dense = np.loadtxt("dense.txt")
     assert code == 0 and "upsample: 1,800 points -> dense.txt" in error
     assert dense.shape == (1800, 4) and len(np.unique(dense[:, :3], axis=0)) == 1800
     assert off_surface(dense[:, :3]) < 0.02
@@ -406,7 +480,7 @@ def test_fit_leaves_a_run_that_is_found_finished_the_next_time(run_folder, n2n, 
     assert summary["iterations"] == 20 and summary["points"] == [600] and summary["config"]["iterations"] == 20
     with (run_folder / "metrics.csv").open() as file:
         steps = [int(row["step"]) for row in csv.DictReader(file)]
-    assert steps and max(steps) < 20
+    assert steps and max(steps) == 20
     before = listing(run_folder)
     monkeypatch.chdir(run_folder.parents[1])
     code, _, error = n2n("fit", "datamodule=files", "datamodule.paths=[utm.xyz]", QUICK)
@@ -491,12 +565,60 @@ def test_doctor_names_versions_and_what_is_missing(n2n, monkeypatch):
     code, out, error = n2n("doctor")
     assert code == 0 and error == ""
     assert f"torch              {torch.__version__}" in out and "ready: try `n2n demo`" in out
+    for package in (*pyproject_names(), "lazrs"):
+        assert f"  {package:<18} {version(package)}\n" in out
+    assert "pytest" not in out and "optional" not in out
+    known = {"scipy": None, "laspy": None, "rich": "12.0.0"}
     found = doctor._version
-    monkeypatch.setattr(doctor, "_version", lambda package: None if package in ("scipy", "laspy") else found(package))
+    monkeypatch.setattr(doctor, "_version", lambda package: known[package] if package in known else found(package))
     code, out, _ = n2n("doctor")
     assert code == 1
-    assert "scipy              MISSING: pip install scipy" in out and "not ready: scipy missing or broken" in out
-    assert "laspy              not installed, needed for reading and writing .las: pip install 'laspy[lazrs]'" in out
+    assert "scipy              MISSING: pip install 'scipy>=1.11'" in out
+    assert "laspy              MISSING: pip install 'laspy[lazrs]>=2.5'" in out
+    assert "rich               12.0.0 DOES NOT FIT: pip install 'rich>=13'" in out
+    assert "not ready: laspy, rich, scipy missing or broken" in out
+
+
+def test_doctor_works_without_what_it_reads(n2n, monkeypatch):
+    def missing(name):
+        raise PackageNotFoundError(name)
+
+    monkeypatch.setattr(doctor, "requires", missing)
+    monkeypatch.setattr(doctor, "_version", lambda _: None)
+    code, out, _ = n2n("doctor")
+    assert code == 1 and "n2n                MISSING: pip install 'n2n'" in out
+
+
+def pyproject_names() -> list[str]:
+    """Return what pyproject.toml lists for every machine."""
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
+    return [re.match(r"[\w-]+", text).group() for text in project["dependencies"] if ";" not in text]
+
+
+def test_doctor_chooses_the_first_of_several_cards(n2n, monkeypatch):
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
+    monkeypatch.setattr(torch.cuda, "device_count", lambda: 2)
+    monkeypatch.setattr(torch.cuda, "get_device_name", lambda index: f"card {index}")
+    monkeypatch.setattr(torch.cuda, "get_device_properties", lambda _: SimpleNamespace(total_memory=2**34))
+    _, out, _ = n2n("doctor")
+    assert "  cuda:0             card 0, 16 GiB; chosen by device=auto\n" in out
+    assert "  cuda:1             card 1, 16 GiB\n" in out
+
+
+@pytest.mark.parametrize("command", ["reconstruct", "denoise", "upsample"])
+def test_help_of_a_task_explains_settings(n2n, capsys, command):
+    with pytest.raises(SystemExit):
+        n2n(command, "--help")
+    out = " ".join(capsys.readouterr().out.split())
+    assert "key=value a setting of the fit" in out and "`n2n fit --cfg job` lists the keys" in out
+    assert ("a tenth wider than the scan" in out) == (command == "reconstruct")
+
+
+def test_examples_survive_zsh(n2n, capsys):
+    with pytest.raises(SystemExit):
+        n2n("--help")
+    examples = [line for line in capsys.readouterr().out.splitlines() if "[scan.ply]" in line]
+    assert examples and all("'datamodule.paths=[scan.ply]'" in line for line in examples)
 
 
 @pytest.mark.parametrize("command", [[], ["reconstruct"], ["denoise"], ["upsample"], ["demo"], ["list"], ["doctor"]])

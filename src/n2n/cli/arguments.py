@@ -21,8 +21,8 @@ examples:
 `n2n COMMAND --help` tells more. Settings are `key=value`, e.g. seed=1; `n2n fit --cfg job` prints them all.
 """
 _SETTINGS = """settings:
-  key=value      a setting of the fit, e.g. iterations=500 or recipe=paper; `n2n fit --cfg job` lists the keys.
-                 Quote brackets: 'key=[a,b]'
+  key=value             a setting of the fit, e.g. iterations=500 or recipe=paper;
+                        `n2n fit --cfg job` lists the keys; quote brackets: 'key=[a,b]'
 """
 _READS = "ply xyz txt csv pts npy npz off obj stl pcd las laz bin"
 _WRITES = {"reconstruct": "ply obj off stl glb", "denoise": "ply xyz txt csv npy npz pcd las laz"}

@@ -2,10 +2,13 @@
 
 import os
 import platform
-from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, requires, version
+from typing import TYPE_CHECKING
 
 from n2n import __version__
+
+if TYPE_CHECKING:
+    from packaging.requirements import Requirement
 
 
 def run_doctor() -> int:
@@ -13,11 +16,11 @@ def run_doctor() -> int:
     print(f"n2n {__version__}, Python {platform.python_version()}, {platform.system()} {platform.machine()}")
     print(f"{os.cpu_count()} CPU cores{_available()}\n")
     problems = []
-    for package, wanted in _required():
+    for package, wanted in sorted(_required().items()):
         found = _version(package)
-        state = found or f"MISSING: pip install {package}"
+        state = found or f"MISSING: pip install '{wanted}'"
         if found and not _fits(found, wanted):
-            state = f"{found} DOES NOT FIT: pip install '{package}{wanted}'"
+            state = f"{found} DOES NOT FIT: pip install '{wanted}'"
         if state != found:
             problems.append(package)
         print(f"  {package:<18} {state}")
@@ -34,38 +37,42 @@ def run_doctor() -> int:
     return 0
 
 
-def _required() -> list[tuple[str, str]]:
-    """Return what n2n's own metadata asks for on this machine: packages, and which versions of them."""
+def _required() -> dict[str, str]:
+    """Return what n2n's own metadata asks for on this machine: package -> requirement."""
     try:
-        from packaging.requirements import Requirement
-    except ImportError:
-        return [("packaging", "")]
-
-    def asked(package: str, extra: str = "") -> Iterator[Requirement]:
-        for requirement in map(Requirement, requires(package) or ()):
-            marker = requirement.marker
-            if marker is None or marker.evaluate({"extra": extra}):
-                yield requirement
-
-    needed = {}
-    try:
-        for requirement in asked("n2n"):
-            needed[requirement.name] = str(requirement.specifier)
+        needed = {requirement.name: requirement for requirement in _asked("n2n")}
+        for requirement in list(needed.values()):
             for extra in requirement.extras if _version(requirement.name) else ():
                 # laspy[lazrs]: what the extra brings and the package alone does not.
-                plain = {str(further) for further in asked(requirement.name)}
-                for further in asked(requirement.name, extra):
-                    if str(further) not in plain:
-                        needed.setdefault(further.name, str(further.specifier))
-    except PackageNotFoundError:
-        return [("n2n", "")]
-    return sorted(needed.items())
+                plain = [further.name for further in _asked(requirement.name)]
+                for further in _asked(requirement.name, extra):
+                    if further.name not in plain:
+                        needed.setdefault(further.name, further)
+    except ImportError as error:
+        # n2n is not installed (run from its source), or the package that reads requirements is not.
+        return {error.name: error.name}
+    return {name: _plain(requirement) for name, requirement in needed.items()}
+
+
+def _asked(package: str, extra: str = "") -> "list[Requirement]":
+    from packaging.requirements import Requirement
+
+    asked = [Requirement(text) for text in requires(package) or ()]
+    return [each for each in asked if each.marker is None or each.marker.evaluate({"extra": extra})]
+
+
+def _plain(requirement: "Requirement") -> str:
+    """Write a requirement without its marker, which is met."""
+    extras = f"[{','.join(sorted(requirement.extras))}]" if requirement.extras else ""
+    return f"{requirement.name}{extras}{requirement.specifier}"
 
 
 def _fits(found: str, wanted: str) -> bool:
-    from packaging.specifiers import SpecifierSet
-
-    return SpecifierSet(wanted).contains(found, prereleases=True)
+    try:
+        from packaging.requirements import Requirement
+    except ImportError:
+        return True
+    return Requirement(wanted).specifier.contains(found, prereleases=True)
 
 
 def _version(package: str) -> str | None:

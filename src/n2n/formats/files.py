@@ -4,6 +4,8 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from n2n.errors import InputError, N2NError, OutputError
 from n2n.formats import arrays, kitti, las, meshes, pcd, ply, text
 from n2n.formats.atomic import atomic_path
@@ -89,7 +91,7 @@ def write_cloud(path: str | Path, cloud: Cloud) -> None:
         raise OutputError(f"{path}: unknown file type {path.suffix!r}; choose one of: {', '.join(_WRITERS)}")
     with atomic_path(path) as temporary:
         writer(temporary, cloud)
-    texts = [name for name, values in cloud.attributes.items() if values.dtype.kind == "U"]
+    texts = [name for name, values in cloud.attributes.items() if np.asarray(values).dtype.kind == "U"]
     if texts and path.suffix.lower() not in _HOLD_TEXTS:
         warnings.warn(
             f"{path.suffix[1:]} cannot store texts: {', '.join(texts)} left out; write csv or npz to keep them",

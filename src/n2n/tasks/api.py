@@ -58,13 +58,23 @@ def _clouds(points: Any) -> list[NDArray[np.float64]]:
         else:
             clouds = [_array(part) for part in points]
             if clouds and all(part.ndim == 1 for part in clouds):
-                # The rows of one cloud.
-                clouds = [np.array(clouds)]
+                clouds = [_stacked(clouds)]
     except (ValueError, TypeError) as error:
         raise InputError(f"points: cannot be read as numbers ({error}); give {_EXPECTED}") from error
-    if any(cloud.ndim != 2 for cloud in clouds):
-        raise InputError(f"points: got {np.ndim(clouds[0])}-dimensional parts; give {_EXPECTED}")
+    odd = next((cloud for cloud in clouds if cloud.ndim != 2), None)
+    if odd is not None:
+        got = (
+            f"a list of {len(clouds)} parts, one of shape {odd.shape}" if odd.ndim else f"{len(clouds)} single numbers"
+        )
+        raise InputError(f"points: got {got}; give {_EXPECTED}")
     return clouds
+
+
+def _stacked(rows: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+    lengths = sorted({len(row) for row in rows})
+    if len(lengths) > 1:
+        raise InputError(f"points: got rows of {lengths[0]} to {lengths[-1]} numbers; give {_EXPECTED}")
+    return np.array(rows)
 
 
 def _array(part: Any) -> NDArray[np.float64]:

@@ -127,3 +127,11 @@ def test_read_only_files_are_known_beforehand(tmp_path, monkeypatch):
     monkeypatch.setattr(os, "access", lambda path, mode: mode != os.W_OK)
     with pytest.raises(OutputError, match="exists and is read-only; choose another name"):
         check_writable(tmp_path / "out.ply", KNOWN)
+
+
+def test_a_folder_that_will_be_made_is_no_mistake_where_it_can_be(tmp_path):
+    (tmp_path / "file.txt").write_text("")
+    check_writable(tmp_path / "new" / "deeper" / "out.ply", KNOWN, new_folder=True)
+    with pytest.raises(OutputError, match=r"out.ply: .*file.txt is a file, not a folder; choose another folder"):
+        check_writable(tmp_path / "file.txt" / "deeper" / "out.ply", KNOWN, new_folder=True)
+    assert [path.name for path in tmp_path.iterdir()] == ["file.txt"]

@@ -3,6 +3,7 @@
 import io
 import logging
 import warnings
+from pathlib import Path
 
 import laspy
 import numpy as np
@@ -122,9 +123,17 @@ CASES = {
     "two_columns.xyz": ("1 2\n3 4\n", "2 column(s) found, at least x y z are needed"),
     "short_row.xyz": ("# by hand\n1 2 3\n4 5\n", "line 3 has another number of columns than the first"),
     "long_row.xyz": ("1 2 3\n4 5 6\n7 8 9 10\n", "line 3 has another number of columns than the first"),
-    "letter.xyz": ("1 2 3\n4 5 x\n", "line 2 is not numbers (could not convert string 'x' to float64)"),
+    "letter.xyz": ("1 2 3\n4 5 x\n", "line 2 is not numbers ('x' in column 3, which is taken for z); mend"),
     "two_headers.xyz": ("scan of\na house\n1 2 3\n", "line 2 is not numbers ('a house'); expected x y z per line"),
     "missing_value.csv": ("x,y,z\n1,2,3\n4,,6\n", "line 3 is not numbers"),
+    "text_first.csv": (
+        "wall,1,2,3\nroof,4,5,6\n",
+        "line 1 is not numbers ('wall' in column 1, which is taken for x); mend it, or name the columns",
+    ),
+    "wide_text.csv": (
+        "x,y,z,label\n1,2,3,wall\n\n4,5,6,7,roof\n",
+        "line 4 has another number of columns than the first",
+    ),
     "page.csv": ("<html>\n<body>\n", "line 2 is not numbers ('<body>')"),
     "decimal_comma.csv": ("1,5;2,5;3,5\n", "line 1 is not numbers"),
     "cut.pts": ("5\n1 2 3\n4 5 6\n", "the first line promises 5 points, the file holds 2; it is cut off"),
@@ -213,3 +222,11 @@ def test_folders_and_missing_files(tmp_path, caplog):
     (tmp_path / "folder.ply").mkdir()
     assert message(tmp_path / "folder.ply", caplog) == "is a folder; give a point cloud file"
     assert message(tmp_path / "none.ply", caplog) == "no such file"
+
+
+def test_a_folder_that_may_not_be_entered(tmp_path, caplog, monkeypatch):
+    def denied(self):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "is_dir", denied)
+    assert message(tmp_path / "scan.ply", caplog) == "cannot be read (Permission denied)"

@@ -6,6 +6,7 @@ import pytest
 from n2n.formats import CLOUD_EXTENSIONS_READ, CLOUD_EXTENSIONS_WRITE, Cloud, read_cloud, write_cloud
 
 UNNAMED = (".xyz", ".txt", ".pts", ".asc", ".npy")
+WITH_TEXTS = (".xyz", ".txt", ".csv", ".pts", ".asc", ".npz")
 TYPED = (".ply", ".npz", ".pcd", ".las", ".laz")
 
 
@@ -58,10 +59,23 @@ def test_an_attribute_called_like_a_coordinate_does_not_replace_it(tmp_path, ext
     assert any(values.tolist() == [7, 8] for values in back.attributes.values())
 
 
-@pytest.mark.parametrize("extension", sorted(set(CLOUD_EXTENSIONS_WRITE) - {".npz"}))
+@pytest.mark.parametrize("extension", sorted(set(CLOUD_EXTENSIONS_WRITE) - set(WITH_TEXTS)))
 def test_texts_are_left_out_where_a_format_has_none(tmp_path, extension):
-    write_cloud(tmp_path / f"scan{extension}", Cloud(np.eye(3), {"station": np.array(["a", "b", "c"])}))
+    with pytest.warns(UserWarning, match=f"{extension[1:]} cannot store texts: station left out; write csv or npz"):
+        write_cloud(tmp_path / f"scan{extension}", Cloud(np.eye(3), {"station": np.array(["a", "b", "c"])}))
     np.testing.assert_allclose(read_cloud(tmp_path / f"scan{extension}").points, np.eye(3), atol=1e-8)
+
+
+@pytest.mark.parametrize("extension", WITH_TEXTS)
+def test_texts_are_kept_whatever_is_in_them(tmp_path, extension):
+    texts = ["wall", "", "two words", " blanks ", "a,b", "a;b", '5" pipe', '"quoted"', "# 7", "http://x", "nan", "Höhe"]
+    cloud = Cloud(np.arange(36.0).reshape(12, 3), {"label": np.array(texts), "number": np.arange(12)})
+    write_cloud(tmp_path / f"scan{extension}", cloud)
+    back = read_cloud(tmp_path / f"scan{extension}")
+    names = ["column3", "column4"] if extension in UNNAMED else ["label", "number"]
+    assert [text.strip() for text in back.attributes[names[0]].tolist()] == [text.strip() for text in texts]
+    np.testing.assert_array_equal(back.attributes[names[1]], np.arange(12))
+    np.testing.assert_array_equal(back.points, cloud.points)
 
 
 @pytest.mark.parametrize("extension", CLOUD_EXTENSIONS_WRITE)

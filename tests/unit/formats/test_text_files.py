@@ -38,6 +38,21 @@ LAYOUTS = [
     ("leica.pts", "2\n1 2 3 7\n4 5 6 8\n", TWO, {"column3": [7, 8]}),
     ("count_and_header.pts", "2\nx y z i\n1 2 3 7\n4 5 6 8\n", TWO, {"i": [7, 8]}),
     ("no_count.pts", "1 2 3\n4 5 6\n", TWO, {}),
+    ("prose.txt", "# my nice scan\n1 2 3\n4 5 6\n", TWO, {}),
+    ("prose_of_four.txt", "# my nice long scan\n1 2 3 7\n4 5 6 8\n", TWO, {"column3": [7, 8]}),
+    ("prose_then_header.txt", "# made by x\n# in metres\nx y z i\n1 2 3 7\n4 5 6 8\n", TWO, {"i": [7, 8]}),
+    ("header_stays.txt", "i x y z\n# x y z w\n7 1 2 3\n8 4 5 6\n", TWO, {"i": [7, 8]}),
+    ("title_of_numbers.txt", "scan of 2020 05 12\n1 2 3\n4 5 6\n", TWO, {}),
+    ("texts.csv", "x,y,z,label,i\n1,2,3,wall,7\n4,5,6,roof,8\n", TWO, {"label": ["wall", "roof"], "i": [7, 8]}),
+    ("texts_first.csv", "label,x,y,z\nwall,1,2,3\nroof,4,5,6\n", TWO, {"label": ["wall", "roof"]}),
+    ("texts_unnamed.xyz", "1 2 3 wall\n4  5\t6  roof\n", TWO, {"column3": ["wall", "roof"]}),
+    ("texts_later.csv", "x,y,z,i\n1,2,3,7\n\n4,5,6,\n", TWO, {"i": ["7", ""]}),
+    (
+        "texts_quoted.csv",
+        '"x","y","z","what, where"\n1,2,3,"wall, outer" # a\n4,5,6,"#1 ""A"""\n',
+        TWO,
+        {"what, where": ["wall, outer", '#1 "A"']},
+    ),
     ("gaps.xyz", "1 nan 3\ninf -INF NaN\n", [[1, np.nan, 3], [np.inf, -np.inf, np.nan]], {}),
     ("utm.xyz", "500000.1234 5000000.5678 100.25\n", [[500000.1234, 5000000.5678, 100.25]], {}),
 ]
@@ -61,6 +76,12 @@ def test_layouts(tmp_path, name, content, points, attributes):
         "x,y,z,a,a\n1,2,3,7,8\n4,5,6,9,0\n",
         "2\n1 2 3 7\n4 5 6 8\n",
         "1 2 3 0.125\n4 5 6 nan\n",
+        "# x y z intensity\n1 2 3 7\n4 5 6 8\n",
+        "#label;x;y;z\n7;1;2;3\n",
+        "//X Y Z R\n1 2 3 7\n4 5 6 8\n",
+        "x,y,z,label,i\n1,2,3,wall,7.5\n4,5,6,,8.5\n",
+        'label,x,y,z\n"wall, outer",1,2,3\nroof,4,5,6\n',
+        "1 2 3 wall\n4 5 6 roof\n",
         # GPS time needs more digits than coordinates.
         "1 2 3 1234567890.12345\n4 5 6 1234567890.12346\n",
     ],
@@ -83,6 +104,22 @@ def test_numpy_reads_what_we_write(tmp_path):
     points = np.random.default_rng(0).normal(size=(100, 3)) + [5e5, 5e6, 100]
     write_cloud(tmp_path / "out.xyz", Cloud(points))
     assert np.abs(np.loadtxt(tmp_path / "out.xyz") - points).max() < 1e-8
+
+
+def test_numpy_still_reads_a_file_whose_header_is_a_comment(tmp_path):
+    table = np.arange(8.0).reshape(2, 4)
+    np.savetxt(tmp_path / "in.txt", table, header="x y z intensity")
+    write_cloud(tmp_path / "out.txt", read_cloud(tmp_path / "in.txt"))
+    np.testing.assert_array_equal(np.loadtxt(tmp_path / "out.txt"), table)
+    # A table of another kind gets bare names in its first line.
+    write_cloud(tmp_path / "out.csv", read_cloud(tmp_path / "in.txt"))
+    assert (tmp_path / "out.csv").read_text().startswith("x,y,z,intensity\n0,1,2,3\n")
+
+
+def test_prose_is_not_written_back_as_a_header(tmp_path):
+    (tmp_path / "in.txt").write_text("# my nice scan\n1 2 3\n")
+    write_cloud(tmp_path / "out.txt", read_cloud(tmp_path / "in.txt"))
+    assert (tmp_path / "out.txt").read_text() == "1 2 3\n"
 
 
 def test_single_precision_is_not_padded_with_noise(tmp_path):

@@ -9,6 +9,7 @@ from n2n.errors import ConfigError, InputError
 from n2n.fitting.assemble import build_field
 from n2n.geometry.frame import Frame
 from n2n.geometry.shapes import scan
+from n2n.tasks import api
 from n2n.tasks.field import FIELD_FILE, Field
 
 SHORT = ["iterations=10", "plan_reuse=5"]
@@ -125,12 +126,49 @@ def test_fit_takes_observations_of_different_size():
         (np.full((200, 3), np.nan), r"points\[0\]: 200 of 200 points are NaN"),
         (np.zeros((200, 2)), r"points\[0\]: expected an array of shape \(n, 3\)"),
         (np.zeros((200, 3)), "all 200 points are equal"),
+        (np.zeros((2, 50, 3)), r"points\[0\]: 50 points are too few"),
+        (torch.zeros(200, 2), r"points\[0\]: expected an array of shape \(n, 3\)"),
+        (torch.zeros(9), r"^points: got 9 single numbers; give an array of shape \(n, 3\), or a list of such arrays$"),
+        ([1.0, 2.0, 3.0], r"^points: got 3 single numbers; give an array of shape"),
+        ([[1.0, 2.0, 3.0], [4.0, 5.0]], r"^points: got rows of 2 to 3 numbers; give an array of shape"),
+        ([np.zeros((150, 3)), np.zeros(3)], r"^points: got a list of 2 parts, one of shape \(3,\); give an array"),
+        ([["a", "b", "c"]], r"^points: cannot be read as numbers \(could not convert"),
         ([], "no observations given"),
     ],
 )
 def test_clouds_that_cannot_be_fitted_are_told(points, message):
     with pytest.raises(InputError, match=message):
         n2n.fit(points)
+
+
+@pytest.mark.parametrize(
+    ("change", "observations"),
+    [
+        (torch.tensor, 1),
+        (lambda cloud: torch.tensor(cloud, requires_grad=True), 1),
+        (np.ndarray.tolist, 1),
+        (list, 1),
+        (lambda cloud: [cloud.tolist(), cloud.tolist()[:120]], 2),
+        (lambda cloud: [torch.tensor(cloud), torch.tensor(cloud[:120])], 2),
+        (lambda cloud: (cloud, cloud), 2),
+        (lambda cloud: np.stack([cloud, cloud]), 2),
+        (lambda cloud: torch.tensor(cloud).float()[None], 1),
+    ],
+    ids=["tensor", "grad", "lists", "rows", "clouds as lists", "tensors", "tuple", "3-D array", "3-D tensor"],
+)
+def test_whatever_holds_numbers_is_a_cloud(monkeypatch, change, observations):
+    seen = []
+
+    def no_fit(clouds, *_):
+        seen.extend(clouds)
+        return _field()
+
+    monkeypatch.setattr(api, "fit_clouds", no_fit)
+    cloud = scan("sphere", 150, 0.02)
+    n2n.fit(change(cloud))
+    assert len(seen) == observations
+    assert all(isinstance(part, np.ndarray) and part.dtype == np.float64 for part in seen)
+    np.testing.assert_allclose(seen[0], cloud, atol=1e-6)
 
 
 def test_recipes_and_settings_are_checked():
