@@ -424,6 +424,22 @@ def test_duplicates_are_told_and_kept(n2n):
     assert clean.shape == (1200, 3) and np.array_equal(clean[::2], clean[1::2])
 
 
+def test_a_stray_point_far_away_does_not_set_the_scale(n2n):
+    stray = np.concatenate([sphere(), [[700.0, 0, 0]]])
+    np.savetxt("stray.xyz", stray)
+    code, _, error = n2n("denoise", "stray.xyz", "-o", "out.xyz", QUICK)
+    assert code == 0 and "1 points far from all others took no part in the fit" in error
+    clean = np.loadtxt("out.xyz")
+    assert clean.shape == stray.shape
+    assert off_surface(clean[:-1], np.zeros(3), 1) < 0.9 * off_surface(stray[:-1], np.zeros(3), 1)
+
+
+@pytest.mark.parametrize("setting", ["logger=wandb", "datamodule.shape=torus", "checkpoint_every=5"])
+def test_settings_of_kept_runs_are_refused_where_none_is_kept(n2n, setting):
+    code, _, error = n2n("denoise", "scan.xyz", "-o", "out.xyz", setting)
+    assert code == 2 and f"{setting} has no effect here" in error and not Path("out.xyz").exists()
+
+
 def test_upsample_gives_rate_times_the_points_on_the_surface_with_attributes(n2n):
     np.savetxt("labels.txt", np.column_stack([sphere(), np.arange(600)]), header="x y z label")
     code, _, error = n2n("upsample", "labels.txt", "-o", "dense.txt", "--rate", "3", QUICK)

@@ -78,5 +78,5 @@ def remarks(item: Input, task: str) -> list[str]:
         happens = _WHAT_HAPPENS.get(task, "they are left out")
         lines.append(f"{item.path}: {left_out:,} of {len(item.cloud):,} rows are NaN or infinite; {happens}")
     if item.repeated:
-        lines.append(f"{item.path}: {item.repeated:,} of {len(item.points):,} points are duplicates")
+        lines.append(f"{item.path}: {item.repeated:,} of {len(item.points):,} points are duplicates; each counts once")
     return lines

@@ -106,8 +106,9 @@ def _fit(options: argparse.Namespace, inputs: list[Input], config: dict[str, Any
     with progress_bar("fitting", options.quiet) as report:
         field = fit_clouds([item.points for item in inputs], config, report=report)
     facts = field.report
-    if facts["left_out"][0]:
-        say(f"{facts['left_out'][0]:,} repeated or far-off points did not take part in the fit", options.quiet)
+    far_off = facts["left_out"][0] - sum(item.repeated for item in inputs)
+    if far_off > 0:
+        say(f"{far_off:,} points far from all others took no part in the fit", options.quiet)
     several = f" in {facts['observations'][0]} observations" if facts["observations"][0] > 1 else ""
     say(
         f"{facts['points'][0]:,} points{several}: noise {facts['noise'][0]:.3g}, spacing {facts['spacing'][0]:.3g} "

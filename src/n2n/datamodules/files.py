@@ -19,7 +19,7 @@ class FilesDataModule(ObservationsDataModule):
 
     def __init__(self, paths: Sequence[str] | Sequence[Sequence[str]], num_observations: int | None = None) -> None:
         if isinstance(paths, str) or not paths:
-            raise InputError("datamodule.paths must be a list of files, e.g. datamodule.paths=[a.ply,b.ply]")
+            raise InputError("datamodule.paths must be a list of files, e.g. 'datamodule.paths=[a.ply,b.ply]'")
         shapes = [[p] if isinstance(p, str) else list(p) for p in paths]
         if all(isinstance(p, str) for p in paths):
             shapes = [list(paths)]

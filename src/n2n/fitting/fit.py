@@ -65,6 +65,7 @@ def fit(
     seed = config["seed"]
     torch.manual_seed(seed)
     device = pick_device(config["device"])
+    identity = config_hash({**config, "device": None, "data": data.fingerprint()})
     shapes = prepare(data, config)
     config = fill_config(config, shapes, device)
     field = build_field(config, len(shapes))
@@ -73,7 +74,6 @@ def fit(
     objective = build_objective(config, [shape.guide(device, seed) for shape in shapes])
     optimizer, scheduler = build_optimizer(config)
     iterations, plan_reuse = config["iterations"], config["plan_reuse"]
-    identity = config_hash({**config, "device": None, "data": data.fingerprint()})
     module = FitModule(field, objective, optimizer, scheduler, iterations, plan_reuse, seed, identity)
     prepared = time.perf_counter()
 

@@ -1,6 +1,6 @@
 """Noise level and point spacing, estimated from the noisy points alone."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +26,6 @@ class Scales:
     spacing: float
     patch: int
     area: float
-
-    def state(self) -> dict:
-        """Return plain numbers for reports and checkpoints."""
-        return asdict(self)
 
 
 def estimate_scales(points: NDArray[np.float64], seed: int = 0) -> Scales:
