@@ -27,7 +27,7 @@ _MAX_BATCH = 32_768
 _GLOBAL_BATCH = 1000  # matched as one leaf: its cost grows with the cube
 _PLAN_REUSE = 20
 _GRID_ITERATIONS, _GRID_RATE = 160, 0.02
-_NETWORK_ITERATIONS, _NETWORK_RATE = 2000, 5e-4
+_NETWORK_ITERATIONS, _NETWORK_RATE = 2000, 1e-4
 
 
 @dataclass(frozen=True)
