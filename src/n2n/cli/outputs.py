@@ -1,5 +1,7 @@
 """Where results go, decided and checked before anything expensive starts."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from n2n.errors import OutputError
@@ -45,6 +47,20 @@ def check_preview(preview: Path, folder: Path) -> None:
         OutputError: Not a .png, or an unwritable place.
     """
     check_writable(preview, (".png",), new_folder=preview.parent.absolute() == folder.absolute())
+
+
+@contextmanager
+def new_folder(folder: Path) -> Iterator[None]:
+    """Create a folder for the result written inside; take it away again, if it is new and empty, when that fails."""
+    missing = [part for part in (folder, *folder.parents) if not part.exists()]
+    make_folder(folder)
+    try:
+        yield
+    except BaseException:
+        with suppress(OSError):
+            for part in missing:
+                part.rmdir()
+        raise
 
 
 def make_folder(folder: Path) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from n2n.cli.console import progress_bar, say
 from n2n.cli.inputs import Input, read_inputs, remarks, split_overrides
-from n2n.cli.outputs import check_preview, make_folder, plan_outputs
+from n2n.cli.outputs import check_preview, new_folder, plan_outputs
 from n2n.errors import ConfigError
 from n2n.formats import CLOUD_EXTENSIONS_WRITE, MESH_EXTENSIONS_WRITE, Cloud, write_cloud, write_mesh
 
@@ -147,8 +147,8 @@ def _write(write: Callable[[Path, Any], None], path: Path, result: Any, quiet: b
     """Write a result into a folder that may not exist yet; tell what its format cannot hold."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        make_folder(path.parent)
-        write(path, result)
+        with new_folder(path.parent):
+            write(path, result)
     for warning in caught:
         if issubclass(warning.category, UserWarning):
             say(str(warning.message), quiet)

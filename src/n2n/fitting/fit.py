@@ -20,6 +20,7 @@ from n2n.datamodules.observations import ObservationsDataModule
 from n2n.errors import ConfigError
 from n2n.fitting.assemble import build_field, build_objective, build_optimizer
 from n2n.fitting.callbacks import ProgressReport, Report
+from n2n.fitting.checkpoint import AtomicCheckpointIO, read_state
 from n2n.fitting.module import FitModule
 from n2n.fitting.prepare import fill_config, prepare
 from n2n.geometry.frame import Frame
@@ -60,6 +61,11 @@ def fit(
         run_dir: Where checkpoints go; an unfinished fit found there is resumed. None keeps nothing.
         report: Told about progress.
         logger: A Lightning logger, or False.
+
+    Raises:
+        ConfigError: The configuration cannot be used, or `run_dir` holds another fit.
+        InputError: The checkpoint in `run_dir` is damaged.
+        OutputError: A checkpoint cannot be written.
     """
     start = time.perf_counter()
     seed = config["seed"]
@@ -95,6 +101,7 @@ def fit(
             devices=1,
             logger=logger,
             callbacks=callbacks,
+            plugins=[AtomicCheckpointIO()],
             enable_checkpointing=bool(run_dir),
             enable_progress_bar=False,
             enable_model_summary=False,
@@ -105,7 +112,7 @@ def fit(
         if first < iterations:
             _train(trainer, module, data, resume)
         else:
-            module.load_state_dict(torch.load(resume, weights_only=True, map_location="cpu")["state_dict"])
+            module.load_state_dict(read_state(resume)["state_dict"])
     field = module.field.eval().to(device)
     return FitResult(
         field=field,
@@ -172,7 +179,7 @@ def _resume_from(run_dir: Path | None) -> Path | None:
 
 
 def _iteration_of(checkpoint: Path, identity: str) -> int:
-    state = torch.load(checkpoint, weights_only=True, map_location="cpu")
+    state = read_state(checkpoint)
     if state.get("identity") != identity:
         raise ConfigError(
             f"{checkpoint.parent} holds a fit of other points or with other settings; "

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from pickle import UnpicklingError
 from typing import Any
 
 import numpy as np
@@ -13,8 +12,8 @@ from numpy.typing import NDArray
 from n2n.architectures.base import SDF
 from n2n.errors import InputError
 from n2n.fitting.assemble import build_field
+from n2n.fitting.checkpoint import read_state, unreadable, write_state
 from n2n.fitting.fit import FitResult, pick_device
-from n2n.formats.atomic import atomic_path
 from n2n.geometry.frame import Frame
 from n2n.tasks.points import denoise_points, upsample_points
 from n2n.tasks.surface import field_box, reconstruct_surface
@@ -112,8 +111,7 @@ class Field:
             "report": self.report,
             "weights": self.sdf.state_dict(),
         }
-        with atomic_path(path) as temporary:
-            torch.save(state, temporary)
+        write_state(path, state)
         return path
 
     @classmethod
@@ -126,14 +124,13 @@ class Field:
         path = Path(run_dir) / FIELD_FILE
         if not path.exists():
             raise InputError(f"{run_dir} holds no finished run ({FIELD_FILE} is missing); make one with `n2n fit`")
+        state = read_state(path)
         try:
-            state = torch.load(path, map_location="cpu", weights_only=True)
             frames = [Frame(tuple(frame["centre"]), frame["scale"]) for frame in state["frames"]]
             sdf = build_field(state["config"], len(frames))
             sdf.load_state_dict(state["weights"])
-        except (RuntimeError, KeyError, EOFError, ValueError, TypeError, UnpicklingError) as error:
-            reason = (str(error) or type(error).__name__).splitlines()[0]
-            raise InputError(f"{path} cannot be read as an n2n field ({reason}); fit again") from error
+        except (RuntimeError, KeyError, ValueError, TypeError) as error:
+            raise unreadable(path, error) from error
         return cls(sdf.eval().to(pick_device(device)), frames, state["config"], state["report"])
 
 
