@@ -19,7 +19,7 @@ import trimesh
 
 from n2n.cli import doctor
 from n2n.cli.main import main
-from n2n.formats import read_cloud
+from n2n.formats import files, read_cloud
 from n2n.tasks.field import Field
 
 QUICK = "iterations=20"
@@ -658,3 +658,15 @@ def test_python_does_the_same_in_three_lines():
     mesh, clean = field.reconstruct(32), field.denoise(points)
     assert mesh.is_watertight and off_surface(mesh.vertices, UTM, 40) < 0.8
     assert clean.shape == points.shape and off_surface(clean, UTM, 40) < 0.9 * off_surface(points, UTM, 40)
+
+
+def test_a_new_folder_is_taken_away_again_when_nothing_can_be_written(n2n, monkeypatch):
+    before = listing(Path())
+
+    def full(path, cloud):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setitem(files._WRITERS, ".xyz", full)
+    code, _, error = n2n("denoise", "scan.xyz", "-o", "new/deep/out.xyz", QUICK)
+    assert code == 2 and "No space left on device" in error
+    assert listing(Path()) == before

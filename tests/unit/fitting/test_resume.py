@@ -1,13 +1,15 @@
 """A fit that was interrupted gives the weights of one that was not."""
 
+import errno
 from functools import cache
+from pathlib import Path
 
 import pytest
 import torch
 
 from n2n.compose import compose
 from n2n.datamodules.observations import ObservationsDataModule
-from n2n.errors import ConfigError
+from n2n.errors import ConfigError, InputError, OutputError
 from n2n.fitting.fit import LAST_CHECKPOINT, fit
 from n2n.geometry.shapes import scan
 
@@ -132,3 +134,26 @@ def test_a_fit_of_other_points_or_settings_is_not_resumed(tmp_path, iteration):
         fit(others, _config(), tmp_path)
     with pytest.raises(ConfigError, match="holds a fit of other points or with other settings"):
         fit(_data(), _config("fast", "optimizer.lr=0.01"), tmp_path)
+
+
+def test_a_damaged_checkpoint_says_what_to_do(tmp_path):
+    _interrupted(_config(), tmp_path, 20)
+    whole = (tmp_path / LAST_CHECKPOINT).read_bytes()
+    (tmp_path / LAST_CHECKPOINT).write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(InputError, match=r"last\.ckpt cannot be read as an n2n field .*; delete it and fit again"):
+        fit(_data(), _config(), tmp_path)
+
+
+def test_a_full_disk_leaves_the_last_whole_checkpoint(tmp_path, monkeypatch):
+    _interrupted(_config(), tmp_path, 20)
+    whole = (tmp_path / LAST_CHECKPOINT).read_bytes()
+
+    def full(path, content):
+        with path.open("wb") as file:
+            file.write(content[:100])
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(OutputError, match="No space left on device"):
+        fit(_data(), _config(), tmp_path)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {LAST_CHECKPOINT: whole}
