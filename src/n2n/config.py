@@ -46,16 +46,16 @@ class Config:
     """One fit. Component entries are mappings of `name` and that component's arguments.
 
     Attributes:
-        seed: Seed of everything random.
+        seed: Seed of everything random, 0 to 2^31 - 1.
         device: auto | cpu | cuda | mps.
         task: What the field is for; the paper chooses lambda and B by it.
         iterations: Optimiser steps; auto = what the architecture needs.
-        batch_size: B, points matched at once; auto = all points of an observation.
+        batch_size: B, points matched at once; auto = all points, up to what one matching can take.
         num_observations: N, observations used per shape; null = all.
         regulariser_weight: lambda of Eq. 7; null without a regulariser.
-        plan_reuse: Optimiser steps per matching.
+        plan_reuse: Optimiser steps per matching; auto = fewer where a batch cannot hold all points.
         pairs: Observations of a pair: random (i, j) or same (i = j).
-        scaffold: Build an oriented local fit before the fit (needed by the terms scaffold, far_field, smoothness).
+        scaffold: Build an oriented local fit before the fit (needed by the terms scaffold, far_field).
         checkpoint_every: Iterations between checkpoints.
         pulls: Times F is applied to denoise a point.
         terms: Further weighted terms of the loss: name -> {weight, arguments}.

@@ -21,6 +21,7 @@ _NOISE_FLOOR = 0.05  # of the spacing: a clean cloud still has one length that l
 _VOXEL = 0.33
 _STIFFNESS = 1.75
 _THIN_PLATE = 8e-3
+_FAR_FIELD = 60.0
 _MAX_CELLS = 3e6  # a whole street in one grid would need more; it gets a coarser one instead
 _BAND_VOXELS = 3.0
 _MAX_BATCH = 32_768
@@ -78,7 +79,7 @@ class Chosen:
             "terms.smoothness.weight": _THIN_PLATE * self.noise * self.spacing / self.area * unit,
             "terms.scaffold.weight": unit,
             "terms.scaffold.normal_weight": stiffness,
-            "terms.far_field.weight": 60 * self.noise**2 * unit,
+            "terms.far_field.weight": _FAR_FIELD * self.noise**2 * unit,
         }
 
 

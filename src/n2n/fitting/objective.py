@@ -10,13 +10,13 @@ from torch import Tensor
 from torch.nn import functional
 
 from n2n.datamodules.observations import Draw
+from n2n.geometry.point_to_plane import point_to_plane
 from n2n.geometry.pull import pull
 from n2n.geometry.sampling import QuerySampler
 from n2n.losses.state import FieldState, Guide
 
 DENOISED_POINTS = 8192
 _FAR_POINTS = 2048
-_CHUNK = 4096
 
 
 @dataclass
@@ -124,24 +124,8 @@ class Objective:
         if guide is None or not len(guide.far_points):
             return None
         normals = functional.normalize(self._evaluate(field, denoised, draw.condition)[1], dim=-1)
-        distance = sheet_distance(guide.far_points, denoised, normals, math.sqrt(guide.area / len(denoised)))
+        distance = point_to_plane(guide.far_points, denoised, normals, math.sqrt(guide.area / len(denoised)))
         return guide.far_points, guide.far_signs * distance
-
-
-def sheet_distance(points: Tensor, samples: Tensor, normals: Tensor, spacing: float) -> Tensor:
-    """Return the unsigned distance of points (m, 3) to a surface known by samples (n, 3) and normals (n, 3).
-
-    The nearest sample is not the nearest point of the surface: that is up to a spacing aside. The distance to the
-    sample alone is too large between samples, and would press the field into every gap of the cloud.
-    """
-    distance = torch.empty(len(points), device=points.device)
-    for start in range(0, len(points), _CHUNK):
-        part = slice(start, start + _CHUNK)
-        reach, index = torch.cdist(points[part], samples).min(dim=1)
-        along = ((points[part] - samples[index]) * normals[index]).sum(-1)
-        aside = (reach.square() - along.square()).clamp(0, spacing**2)
-        distance[part] = (reach.square() - aside).sqrt()
-    return distance
 
 
 def _some(far: tuple[Tensor, Tensor] | None, generator: torch.Generator) -> tuple[Tensor, Tensor] | None:

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from n2n.errors import InputError
+from n2n.geometry.outliers import first_of_equal
 
 MIN_POINTS = 100
 _FLATNESS = 1e-5  # of the extent; a line stored in single precision, or with six digits, is this crooked
@@ -32,8 +33,7 @@ def count_distinct(points: NDArray[np.float64], name: str) -> int:
         raise InputError(f"{name}: {count} of {len(points)} points are NaN or infinite; remove them first")
     if len(points) < MIN_POINTS:
         raise InputError(f"{name}: {len(points)} points are too few for a surface; at least {MIN_POINTS} are needed")
-    ordered = points[np.lexsort(points.T)]
-    distinct = 1 + int((ordered[1:] != ordered[:-1]).any(axis=1).sum())
+    distinct = int(first_of_equal(points).sum())
     if distinct == 1:
         raise InputError(f"{name}: all {len(points)} points are equal; this is not a surface")
     if distinct < MIN_POINTS:

@@ -17,10 +17,17 @@ def usable(points: NDArray[np.float64]) -> NDArray[np.bool_]:
     Args:
         points: (n, 3), finite.
     """
-    kept = np.zeros(len(points), bool)
-    kept[np.unique(points, axis=0, return_index=True)[1]] = True
+    kept = first_of_equal(points)
     chosen = np.flatnonzero(kept)
     if len(chosen) > _NEIGHBOUR:
         reach = cKDTree(points[chosen]).query(points[chosen], _NEIGHBOUR + 1)[0][:, -1]
         kept[chosen[reach > _LONELY * np.median(reach)]] = False
     return kept
+
+
+def first_of_equal(points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Tell which of (n, 3) points have no equal before them, (n,)."""
+    order = np.lexsort(points.T)  # stable: equal points keep their order
+    first = np.ones(len(points), bool)
+    first[order[1:]] = (points[order[1:]] != points[order[:-1]]).any(axis=1)
+    return first

@@ -128,6 +128,6 @@ def changes_sign(values: NDArray[np.float64]) -> NDArray[np.bool_]:
     return negative.any(axis=1) & ~negative.all(axis=1)
 
 
-def triple(position: NDArray[np.float64]) -> str:
+def triple(position: NDArray[np.float64], digits: int = 3) -> str:
     """Write a position for a message."""
-    return "(" + ", ".join(f"{x:.3g}" for x in position) + ")"
+    return "(" + ", ".join(f"{x:.{digits}g}" for x in position) + ")"

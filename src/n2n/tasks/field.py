@@ -15,6 +15,7 @@ from n2n.fitting.assemble import build_field
 from n2n.fitting.checkpoint import read_state, unreadable, write_state
 from n2n.fitting.fit import FitResult, pick_device
 from n2n.geometry.frame import Frame
+from n2n.geometry.sparse_grid import triple
 from n2n.tasks.points import denoise_points, upsample_points
 from n2n.tasks.surface import field_box, reconstruct_surface
 
@@ -72,7 +73,11 @@ class Field:
     def upsample(
         self, points: NDArray[np.float64], rate: int = 4, seed: int = 0, shape: int = 0
     ) -> NDArray[np.float64]:
-        """Return (rate * n, 3) points on the surface: the n denoised points, then rate - 1 perturbed copies, pulled."""
+        """Return (rate * n, 3) points on the surface: the n denoised points, then rate - 1 perturbed copies, pulled.
+
+        Raises:
+            InputError: As for `denoise`, or rate < 1.
+        """
         near, pulls = self._near(points, shape), self.config["pulls"]
         return upsample_points(self.sdf, self.frames[shape], near, rate, seed, shape, pulls)
 
@@ -92,7 +97,7 @@ class Field:
         if inside.sum() < _MOSTLY * len(points):
             raise InputError(
                 f"{np.count_nonzero(~inside):,} of {len(points):,} points lie outside the box the field was fitted in, "
-                f"{_corner(lower)} to {_corner(upper)}; give the cloud it was fitted to, or fit this one"
+                f"{triple(lower, 6)} to {triple(upper, 6)}; give the cloud it was fitted to, or fit this one"
             )
         return points
 
@@ -132,10 +137,6 @@ class Field:
         except (RuntimeError, KeyError, ValueError, TypeError) as error:
             raise unreadable(path, error) from error
         return cls(sdf.eval().to(pick_device(device)), frames, state["config"], state["report"])
-
-
-def _corner(position: NDArray[np.float64]) -> str:
-    return "(" + ", ".join(f"{x:.6g}" for x in position) + ")"
 
 
 def _points(points: NDArray[np.float64]) -> NDArray[np.float64]:
