@@ -6,7 +6,9 @@ import torch
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
+from n2n.transport import assignment
 from n2n.transport.assignment import _PARALLEL_FROM, exact_assignment, matching_cost
+from n2n.transport.pairing import StratifiedPairing
 
 FEW, MANY = 3, _PARALLEL_FROM + 1  # leaves: matched one after the other, and in threads
 
@@ -64,6 +66,35 @@ def test_leaves_are_matched_alone_and_stay_in_order(count):
     source, target = _leaves(count, 12, 1), _leaves(count, 12, 2)
     alone = torch.cat([exact_assignment(source[i : i + 1], target[i : i + 1]) for i in range(count)])
     assert torch.equal(exact_assignment(source, target), alone)
+
+
+@pytest.mark.parametrize("pairs", [1, 12 * 12, 5 * 12 * 12, 80 * 12 * 12])
+def test_few_costs_are_held_at_once(monkeypatch, pairs):
+    source, target = _leaves(MANY, 12, 1), _leaves(MANY, 12, 2)
+    expected = exact_assignment(source, target)
+    held = []
+    monkeypatch.setattr(assignment, "_PAIRS", pairs)
+    monkeypatch.setattr(assignment, "matching_cost", lambda *args: held.append(matching_cost(*args)) or held[-1])
+    assert torch.equal(exact_assignment(source, target), expected)
+    assert sum(map(len, held)) == MANY
+    assert all(len(cost) == 1 or cost.numel() <= pairs for cost in held)
+
+
+@pytest.mark.parametrize("cores", [1, 5, 100])
+def test_any_number_of_cores(monkeypatch, cores):
+    source, target = _leaves(MANY, 12, 1), _leaves(MANY, 12, 2)
+    expected = exact_assignment(source, target)
+    monkeypatch.setattr(assignment, "cpu_count", lambda: cores)
+    assert torch.equal(exact_assignment(source, target), expected)
+
+
+@pytest.mark.parametrize(("queries", "targets", "batch_size"), [(900, 1300, 700), (1300, 900, 5000)])
+def test_a_plan_over_leaves_is_one_to_one(queries, targets, batch_size):
+    queries, targets = _leaves(1, queries, 1)[0], _leaves(1, targets, 2)[0]
+    first, second = StratifiedPairing(batch_size, 8)(queries, targets, _generator())
+    matched = second.gather(1, exact_assignment(queries[first], targets[second]))
+    assert len(first.unique()) == len(matched.unique()) == first.numel()
+    assert torch.equal(matched.sort(1).values, second.sort(1).values)
 
 
 def test_exponents_can_disagree():

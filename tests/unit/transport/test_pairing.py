@@ -81,6 +81,17 @@ def test_draws_follow_the_generator():
     assert not torch.equal(a[0].unique(), c[0].unique()) and not torch.equal(a[1].unique(), c[1].unique())
 
 
+@pytest.mark.parametrize("pairing", [GlobalPairing(32), StratifiedPairing(32, 4)])
+def test_no_point_is_preferred(pairing):
+    # A point drawn more often than others would pull the surface to its noise.
+    queries, targets, generator = _cloud(40, 1), _cloud(80, 2), _generator()
+    draws = [pairing(queries, targets, generator) for _ in range(300)]
+    for index, count in ((0, 40), (1, 80)):
+        often = torch.cat([draw[index].flatten() for draw in draws]).bincount(minlength=count)
+        share = 32 / count
+        assert (often - 300 * share).abs().max() < 5 * (300 * share * (1 - share)) ** 0.5
+
+
 def test_borders_of_the_leaves_move_between_draws():
     cloud = _cloud(256)
     leaves = [
