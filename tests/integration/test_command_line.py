@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 import torch
 import trimesh
+from scipy.spatial import cKDTree
 
 from n2n.cli import doctor
 from n2n.cli.main import main
@@ -381,6 +382,24 @@ def test_denoise_moves_points_in_their_order_onto_the_surface(n2n):
     assert off_surface(clean) < 0.9 * off_surface(noisy)
 
 
+def test_even_spreads_the_points_along_the_surface_in_their_order(run_folder, n2n):
+    scan = str(run_folder.parents[1] / "utm.xyz")
+    spacing = 40 * np.sqrt(4 * np.pi / 600)
+    for flags, rate in ((("denoise",), 1), (("upsample", "--rate", "2"), 2)):
+        for name, even in (("plain.xyz", ()), ("even.xyz", ("--even",))):
+            assert n2n(*flags, scan, "--run", run_folder, "-o", name, "-q", *even) == (0, "", "")
+        plain, spread = np.loadtxt("plain.xyz"), np.loadtxt("even.xyz")
+        assert spread.shape == plain.shape == (600 * rate, 3)
+        assert np.linalg.norm(spread - plain, axis=1).mean() < spacing and off_surface(spread, UTM, 40) < 0.8
+        gaps = [cKDTree(points).query(points, 2)[0][:, 1].mean() / spacing * rate**0.5 for points in (plain, spread)]
+        assert gaps[0] < 0.65 and gaps[1] > 0.85  # a hexagonal packing has 1.07
+
+
+def test_even_is_no_flag_of_reconstruct(n2n):
+    code, _, error = n2n("reconstruct", "scan.xyz", "-o", "mesh.ply", "--even")
+    assert code == 2 and "n2n reconstruct does not know the argument '--even'" in error
+
+
 def test_the_same_seed_gives_the_same_file(n2n):
     for name, seed in (("a.xyz", "3"), ("b.xyz", "3"), ("c.xyz", "4")):
         assert n2n("denoise", "scan.xyz", "-o", name, "--seed", seed, QUICK, "-q")[0] == 0
@@ -428,10 +447,55 @@ def test_a_stray_point_far_away_does_not_set_the_scale(n2n):
     stray = np.concatenate([sphere(), [[700.0, 0, 0]]])
     np.savetxt("stray.xyz", stray)
     code, _, error = n2n("denoise", "stray.xyz", "-o", "out.xyz", QUICK)
-    assert code == 0 and "1 points far from all others took no part in the fit" in error
+    assert code == 0 and "1 points look like outliers and took no part in the fit" in error
     clean = np.loadtxt("out.xyz")
     assert clean.shape == stray.shape
     assert off_surface(clean[:-1], np.zeros(3), 1) < 0.9 * off_surface(stray[:-1], np.zeros(3), 1)
+
+
+def with_strays() -> tuple[np.ndarray, np.ndarray]:
+    """Return rows x y z label, some of them halfway to the centre and one not a number, and which are strays."""
+    points, stray = sphere(), np.zeros(600, bool)
+    stray[5::60] = True
+    points[stray] *= 0.4
+    points[100] = np.nan
+    return np.column_stack([points, np.arange(600)]), stray
+
+
+def test_outliers_are_told_and_moved_like_all_points(n2n):
+    table, stray = with_strays()
+    np.savetxt("strays.xyz", table)
+    code, _, error = n2n("denoise", "strays.xyz", "-o", "out.xyz", QUICK)
+    assert code == 0 and f"{stray.sum()} points look like outliers and took no part in the fit" in error
+    clean = np.loadtxt("out.xyz")
+    assert np.array_equal(clean[:, 3], table[:, 3])
+    assert off_surface(np.delete(clean[:, :3], 100, 0)) < 0.5 * off_surface(np.delete(table[:, :3], 100, 0))
+
+
+@pytest.mark.parametrize("extra", [(), ("--even",)])
+def test_denoise_can_remove_outliers_and_keeps_the_rest(n2n, extra):
+    table, stray = with_strays()
+    np.savetxt("strays.xyz", table)
+    code, _, error = n2n("denoise", "strays.xyz", "-o", "out.xyz", "--remove-outliers", *extra, QUICK)
+    assert code == 0 and f"strays.xyz: {stray.sum()} outliers removed" in error
+    clean = np.loadtxt("out.xyz")
+    assert np.array_equal(clean[:, 3], np.flatnonzero(~stray)) and np.isnan(clean[clean[:, 3] == 100, :3]).all()
+    assert off_surface(clean[clean[:, 3] != 100, :3]) < 0.02
+
+
+def test_upsample_can_start_without_outliers(n2n):
+    table, stray = with_strays()
+    np.savetxt("strays.xyz", table)
+    code, _, error = n2n("upsample", "strays.xyz", "-o", "out.xyz", "--rate", "2", "--remove-outliers", QUICK)
+    assert code == 0 and "outliers removed" in error
+    stray[100] = True
+    assert np.array_equal(np.loadtxt("out.xyz")[:, 3], np.tile(np.flatnonzero(~stray), 2))
+
+
+def test_a_scan_without_outliers_is_written_whole(n2n):
+    code, _, error = n2n(*DENOISE, "--remove-outliers", QUICK)
+    assert code == 0 and "0 outliers removed" in error and "look like outliers" not in error
+    assert np.loadtxt("out.xyz").shape == (600, 3)
 
 
 @pytest.mark.parametrize("setting", ["logger=wandb", "datamodule.shape=torus", "checkpoint_every=5"])

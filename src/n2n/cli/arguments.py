@@ -106,6 +106,11 @@ def _add_task(commands: argparse._SubParsersAction, task: str, summary: str, exa
         command.add_argument("--edge", type=float, metavar="LENGTH", help="voxel edge in the scan's units instead")
     if task == "upsample":
         command.add_argument("--rate", type=int, default=4, metavar="R", help="points out per point in (4)")
+    if task != "reconstruct":
+        command.add_argument("--even", action="store_true", help="also spread the points evenly along the surface")
+        command.add_argument(
+            "--remove-outliers", action="store_true", help="leave out points that look like outliers (they are kept)"
+        )
     command.add_argument("--preview", metavar="PNG", help="also draw before and after")
     command.add_argument("--run", metavar="RUN", help="use the field of a run folder, no new fit")
     command.add_argument(

@@ -15,6 +15,7 @@ from n2n.cli.inputs import Input, read_inputs, remarks, split_overrides
 from n2n.cli.outputs import check_preview, new_folder, plan_outputs
 from n2n.errors import ConfigError
 from n2n.formats import CLOUD_EXTENSIONS_WRITE, MESH_EXTENSIONS_WRITE, Cloud, write_cloud, write_mesh
+from n2n.geometry.outliers import outliers
 
 if TYPE_CHECKING:
     from n2n.tasks.field import Field
@@ -106,9 +107,8 @@ def _fit(options: argparse.Namespace, inputs: list[Input], config: dict[str, Any
     with progress_bar("fitting", options.quiet) as report:
         field = fit_clouds([item.points for item in inputs], config, report=report)
     facts = field.report
-    far_off = facts["left_out"][0] - sum(item.repeated for item in inputs)
-    if far_off > 0:
-        say(f"{far_off:,} points far from all others took no part in the fit", options.quiet)
+    if count := facts["outliers"][0]:
+        say(f"{count:,} points look like outliers and took no part in the fit", options.quiet)
     several = f" in {facts['observations'][0]} observations" if facts["observations"][0] > 1 else ""
     say(
         f"{facts['points'][0]:,} points{several}: noise {facts['noise'][0]:.3g}, spacing {facts['spacing'][0]:.3g} "
@@ -156,15 +156,30 @@ def _write(write: Callable[[Path, Any], None], path: Path, result: Any, quiet: b
 
 def _denoised(field: "Field", item: Input, options: argparse.Namespace) -> Cloud:
     """Denoise the finite rows; others stay as they are, so that number and order hold."""
-    points = item.cloud.points.copy()
-    points[item.finite] = field.denoise(item.points, options.shape)
-    return item.cloud.replace(points)
+    points, rows = item.cloud.points.copy(), _rows(item, options)
+    points[rows] = field.denoise(points[rows], options.shape, options.even)
+    if not options.remove_outliers:
+        return item.cloud.replace(points)
+    kept = ~item.finite
+    kept[rows] = True
+    return item.cloud.replace(points[kept], np.flatnonzero(kept))
 
 
 def _upsampled(field: "Field", item: Input, options: argparse.Namespace) -> Cloud:
     """Add points; each takes the attributes of the point it was made from."""
-    points = field.upsample(item.points, options.rate, options.seed, options.shape)
-    return item.cloud.replace(points, np.tile(np.flatnonzero(item.finite), options.rate))
+    rows = _rows(item, options)
+    points = field.upsample(item.cloud.points[rows], options.rate, options.seed, options.shape, options.even)
+    return item.cloud.replace(points, np.tile(rows, options.rate))
+
+
+def _rows(item: Input, options: argparse.Namespace) -> np.ndarray:
+    """Return the rows to move: the finite ones, with --remove-outliers without outliers."""
+    rows = np.flatnonzero(item.finite)
+    if options.remove_outliers:
+        stray = outliers(item.points)
+        rows = rows[~stray]
+        say(f"{item.path}: {np.count_nonzero(stray):,} outliers removed", options.quiet)
+    return rows
 
 
 def _preview(path: str, before: np.ndarray | None, after: np.ndarray | None, mesh: object) -> None:

@@ -12,7 +12,7 @@ from torch.utils.data import DataLoader, IterableDataset
 
 from n2n.errors import InputError
 from n2n.geometry.frame import Frame
-from n2n.geometry.outliers import usable
+from n2n.geometry.outliers import first_of_equal, outliers
 
 
 @dataclass
@@ -38,8 +38,9 @@ class ObservationsDataModule(L.LightningDataModule):
 
     Attributes:
         frames: One world <-> unit map per shape.
-        shapes: Per shape its observations, (n_i, 3) float32 unit coordinates; repeated and far-off points left out.
+        shapes: Per shape its observations, (n_i, 3) float32 unit coordinates; repeated points and outliers left out.
         left_out: Per shape how many points those were.
+        outliers: Per shape how many of these look like outliers.
 
     Args:
         shapes: Per shape its observations, (n_i, 3) float64 world coordinates; point counts may differ.
@@ -50,15 +51,18 @@ class ObservationsDataModule(L.LightningDataModule):
         super().__init__()
         if not shapes or not all(shapes):
             raise InputError("no observations given; pass at least one noisy point cloud")
-        self.frames, self.shapes, self.left_out = [], [], []
+        self.frames, self.shapes, self.left_out, self.outliers = [], [], [], []
         for clouds in shapes:
             used = clouds if num_observations is None else clouds[:num_observations]
             if num_observations is not None and len(used) < num_observations:
                 raise InputError(
                     f"num_observations={num_observations}, but only {len(used)} given; add observations or lower it"
                 )
-            kept = [cloud[usable(cloud)] for cloud in used]
+            # Each by itself: next to a denser or cleaner observation all points of another would look like outliers.
+            stray = [outliers(cloud) for cloud in used]
+            kept = [cloud[first_of_equal(cloud) & ~out] for cloud, out in zip(used, stray, strict=True)]
             self.left_out.append(sum(map(len, used)) - sum(map(len, kept)))
+            self.outliers.append(int(sum(out.sum() for out in stray)))
             used = kept
             frame = Frame.fit(used)
             self.frames.append(frame)

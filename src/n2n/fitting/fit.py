@@ -125,6 +125,7 @@ def fit(
             "points": [sum(len(c) for c in clouds) for clouds in data.shapes],
             "observations": [len(clouds) for clouds in data.shapes],
             "left_out": data.left_out,
+            "outliers": data.outliers,
             "noise": [s.scales.noise * f.scale for s, f in zip(shapes, data.frames, strict=True)],
             "spacing": [s.chosen.spacing * f.scale for s, f in zip(shapes, data.frames, strict=True)],
             "losses": {name: float(value) for name, value in trainer.callback_metrics.items() if name != "step"},

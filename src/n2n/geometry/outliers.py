@@ -1,4 +1,4 @@
-"""Points that belong to no surface: repeated ones, and ones far from all others."""
+"""Points that belong to no surface: repeated ones, ones far from all others, and outliers around the surface."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,23 +6,17 @@ from scipy.spatial import cKDTree
 
 _NEIGHBOUR = 4
 _LONELY = 30.0  # times the median: the sparse ends of a lidar frame stay, a stray point ten scans away does not
-
-
-def usable(points: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Tell which points can inform a fit, (n,): the first of equal ones, and none that is far from all others.
-
-    A single far point would otherwise set the scale of the whole frame. A point is far if its fourth neighbour is 30
-    times as far away as is usual in the cloud.
-
-    Args:
-        points: (n, 3), finite.
-    """
-    kept = first_of_equal(points)
-    chosen = np.flatnonzero(kept)
-    if len(chosen) > _NEIGHBOUR:
-        reach = cKDTree(points[chosen]).query(points[chosen], _NEIGHBOUR + 1)[0][:, -1]
-        kept[chosen[reach > _LONELY * np.median(reach)]] = False
-    return kept
+_REACHES = (6, 24)  # few, to see outliers close to the surface; more than a small cluster of them holds
+_AROUND, _THINNING = 16, 16  # the usual reach is the median of 16 in every 16th point: of some 256 neighbours
+_SUSPECT = 1.8
+_AWAY = 2.0
+_PATCH = 32
+_FLAT = 0.4  # a ball of points has about 0.65
+_EVEN = 5.0  # a sheet has 2, a line 4; more, and the patch is a cluster and something far behind it
+_ON, _OFF = 3.0, 5.0
+_ROUNDS = 5
+_FEWEST = 100
+_CHUNK = 8192
 
 
 def first_of_equal(points: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -31,3 +25,97 @@ def first_of_equal(points: NDArray[np.float64]) -> NDArray[np.bool_]:
     first = np.ones(len(points), bool)
     first[order[1:]] = (points[order[1:]] != points[order[:-1]]).any(axis=1)
     return first
+
+
+def outliers(points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Tell which points look like outliers, (n,); equal points share one verdict.
+
+    A point is one if its fourth neighbour is 30 times as far away as is usual in the cloud: a single far point would
+    set the scale of the whole frame. Of the rest, a point is a suspect if its reach, the distance to its 6th or 24th
+    neighbour, is 1.8 times the usual one of its surroundings. A suspect on a flat patch of its neighbours is a sparse
+    part of the surface. Of the others, those are outliers that are two usual reaches away from all points beyond
+    suspicion, or five deviations off the plane through the nearest of them. Outliers hide others behind them, so this
+    is repeated without them. Fewer than 100 points are too few to judge by their surroundings.
+
+    An outlier within about four deviations of the noise cannot be told from a point of the surface, and is not.
+
+    Args:
+        points: (n, 3), finite.
+    """
+    order = np.lexsort(points.T)
+    new = np.ones(len(points), bool)
+    new[1:] = (points[order[1:]] != points[order[:-1]]).any(axis=1)
+    distinct = points[order[new]]
+    kept = np.arange(len(distinct))
+    if len(distinct) > _NEIGHBOUR:
+        reach = cKDTree(distinct).query(distinct, [_NEIGHBOUR + 1], workers=-1)[0][:, 0]
+        kept = kept[reach <= _LONELY * np.median(reach)]
+    for _ in range(_ROUNDS):
+        found = _most_evident(distinct[kept])
+        if not found.any():
+            break
+        kept = kept[~found]
+    verdict = np.ones(len(distinct), bool)
+    verdict[kept] = False
+    result = np.empty(len(points), bool)
+    result[order] = verdict[np.cumsum(new) - 1]
+    return result
+
+
+def _most_evident(points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    found = np.zeros(len(points), bool)
+    if len(points) < _FEWEST:
+        return found
+    tree = cKDTree(points)
+    reach = tree.query(points, [min(k, len(points) // 4) + 1 for k in _REACHES], workers=-1)[0]
+    usual = _usual(points, reach)
+    suspected = (reach > _SUSPECT * usual).any(axis=1)
+    suspects = np.flatnonzero(suspected)
+    if not len(suspects) or len(points) - len(suspects) < 2 * _PATCH:
+        return found
+    height, flatness, distance = _against_patch(tree, points[suspects], skip=1)
+    even = distance[:, -1] < _EVEN * distance[:, _PATCH // 4 - 1]
+    suspects = suspects[~((height < _ON) & (flatness < _FLAT) & even)]
+    height, _, distance = _against_patch(cKDTree(points[~suspected]), points[suspects])
+    found[suspects[(distance[:, 0] > _AWAY * usual[suspects, -1]) | (height > _OFF)]] = True
+    return found
+
+
+def _usual(points: NDArray[np.float64], reach: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the median reaches around each point, like `reach` (n, r), from some of all points.
+
+    The surroundings are wide, so that where outliers are alone with each other the surface nearby still decides.
+    """
+    count = min(len(points), max(len(points) // _THINNING, 25 * _AROUND))
+    some = np.random.default_rng(0).permutation(len(points))[:count]
+    tree, usual = cKDTree(points[some]), np.empty_like(reach)
+    for start in range(0, len(points), _CHUNK):
+        chunk = slice(start, start + _CHUNK)
+        around = tree.query(points[chunk], min(_AROUND, count), workers=-1)[1]
+        usual[chunk] = np.median(reach[some[around]], axis=1)
+    return usual
+
+
+def _against_patch(
+    tree: cKDTree, queries: NDArray[np.float64], skip: int = 0
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Fit a plane to the nearest points of the tree, without the first `skip`, for each query.
+
+    Returns:
+        Distance of the query from the plane in deviations of the patch, (q,); deviation over length of the patch,
+        (q,); distances to the points of the patch, (q, k).
+    """
+    height, flatness = np.empty(len(queries)), np.empty(len(queries))
+    distance = np.empty((len(queries), _PATCH))
+    for start in range(0, len(queries), _CHUNK):
+        chunk = slice(start, start + _CHUNK)
+        far, index = tree.query(queries[chunk], _PATCH + skip, workers=-1)
+        patch = tree.data[index[:, skip:]]
+        mean = patch.mean(axis=1)
+        centred = patch - mean[:, None]
+        variance, axes = np.linalg.eigh(np.einsum("qki,qkj->qij", centred, centred) / _PATCH)
+        deviation, length = np.sqrt(np.maximum(variance[:, [0, 2]], 1e-300)).T
+        height[chunk] = np.abs(np.einsum("qi,qi->q", queries[chunk] - mean, axes[:, :, 0])) / deviation
+        flatness[chunk] = deviation / length
+        distance[chunk] = far[:, skip:]
+    return height, flatness, distance

@@ -62,24 +62,32 @@ class Field:
         """
         return reconstruct_surface(self.sdf, self.frames[shape], self.config, resolution, edge, shape, keep_all)
 
-    def denoise(self, points: NDArray[np.float64], shape: int = 0) -> NDArray[np.float64]:
+    def denoise(self, points: NDArray[np.float64], shape: int = 0, even: bool = False) -> NDArray[np.float64]:
         """Pull (n, 3) noisy points onto the surface; number and order are kept.
+
+        Args:
+            points: (n, 3).
+            shape: Which shape of a field that holds several.
+            even: Also spread them evenly over the part of the surface they cover.
 
         Raises:
             InputError: Most points lie where the field knows nothing: they are another cloud's.
         """
-        return denoise_points(self.sdf, self.frames[shape], self._near(points, shape), shape, self.config["pulls"])
+        near, pulls = self._near(points, shape), self.config["pulls"]
+        return denoise_points(self.sdf, self.frames[shape], near, shape, pulls, even)
 
     def upsample(
-        self, points: NDArray[np.float64], rate: int = 4, seed: int = 0, shape: int = 0
+        self, points: NDArray[np.float64], rate: int = 4, seed: int = 0, shape: int = 0, even: bool = False
     ) -> NDArray[np.float64]:
         """Return (rate * n, 3) points on the surface: the n denoised points, then rate - 1 perturbed copies, pulled.
+
+        With `even` all of them are spread evenly over the part of the surface they cover; the order stays.
 
         Raises:
             InputError: As for `denoise`, or rate < 1.
         """
         near, pulls = self._near(points, shape), self.config["pulls"]
-        return upsample_points(self.sdf, self.frames[shape], near, rate, seed, shape, pulls)
+        return upsample_points(self.sdf, self.frames[shape], near, rate, seed, shape, pulls, even)
 
     def sdf_at(self, points: NDArray[np.float64], shape: int = 0) -> NDArray[np.float64]:
         """Return signed distances (n,) in world units at (n, 3) positions, inside negative."""

@@ -1,46 +1,69 @@
-"""Denoising and upsampling: points pulled onto the zero level set of a fitted field."""
+"""Denoising and upsampling: points pulled onto the zero level set of a fitted field, and spread evenly along it."""
+
+from functools import partial
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
+from torch.nn import functional
 
 from n2n.architectures.base import SDF
 from n2n.errors import InputError
 from n2n.geometry.frame import Frame
 from n2n.geometry.pull import pull
+from n2n.geometry.relaxation import spread
 
 _CHUNK = 100_000
 
 
 def denoise_points(
-    sdf: SDF, frame: Frame, points: NDArray[np.float64], shape: int = 0, pulls: int = 3
+    sdf: SDF, frame: Frame, points: NDArray[np.float64], shape: int = 0, pulls: int = 3, even: bool = False
 ) -> NDArray[np.float64]:
-    """Pull world points (n, 3) onto the surface.
+    """Pull world points (n, 3) onto the surface; `even` also spreads them along it.
 
     Source: Ma et al. 2023, Eq. 3 and Sec. 4.1. Differs: the pull may be repeated, as a learned f is a distance only
     to first order: the first pull leaves about a tenth of the way, the second a hundredth. The paper pulls once.
     """
-    device = next(sdf.parameters()).device
-    unit = frame.to_unit(points)
-    moved = np.empty_like(unit)
     with torch.no_grad(), sdf.shared():
-        for start in range(0, len(unit), _CHUNK):
-            part = torch.as_tensor(unit[start : start + _CHUNK], dtype=torch.float32, device=device)
-            codes = torch.full((len(part),), shape, dtype=torch.long, device=device)
-            for _ in range(pulls):
-                part = pull(part, *sdf.value_and_gradient(part, codes))
-            moved[start : start + _CHUNK] = part.cpu().double().numpy()
+        moved, _ = _project(sdf, frame.to_unit(points), shape, pulls)
+        if even:
+            moved = spread(moved, partial(_project, sdf, shape=shape, pulls=1))
+            moved, _ = _project(sdf, moved, shape, pulls)
     return frame.to_world(moved)
 
 
+def _project(
+    sdf: SDF, points: NDArray[np.float64], shape: int, pulls: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Pull unit points (n, 3); return them and the unit normals where the last pull began, (n, 3) each."""
+    device = next(sdf.parameters()).device
+    moved, normals = np.empty_like(points), np.empty_like(points)
+    for start in range(0, len(points), _CHUNK):
+        part = torch.as_tensor(points[start : start + _CHUNK], dtype=torch.float32, device=device)
+        codes = torch.full((len(part),), shape, dtype=torch.long, device=device)
+        for _ in range(pulls):
+            value, gradient = sdf.value_and_gradient(part, codes)
+            part = pull(part, value, gradient)
+        moved[start : start + _CHUNK] = part.cpu().double().numpy()
+        normals[start : start + _CHUNK] = functional.normalize(gradient, dim=-1).cpu().double().numpy()
+    return moved, normals
+
+
 def upsample_points(
-    sdf: SDF, frame: Frame, points: NDArray[np.float64], rate: int, seed: int = 0, shape: int = 0, pulls: int = 3
+    sdf: SDF,
+    frame: Frame,
+    points: NDArray[np.float64],
+    rate: int,
+    seed: int = 0,
+    shape: int = 0,
+    pulls: int = 3,
+    even: bool = False,
 ) -> NDArray[np.float64]:
     """Return (rate * n, 3) world points on the surface.
 
     The first n are the denoised points themselves; the rest are copies perturbed by about the distance between
-    neighbours and pulled back, so that they fill the gaps.
+    neighbours and pulled back, so that they fill the gaps. `even` then spreads all of them along the surface.
 
     Raises:
         InputError: rate < 1.
@@ -56,4 +79,5 @@ def upsample_points(
     gap = np.maximum(spacing, np.median(spacing))
     random = np.random.default_rng(seed)
     copies = [clean + gap * random.standard_normal(clean.shape) for _ in range(rate - 1)]
-    return np.concatenate([clean, *(denoise_points(sdf, frame, copy, shape, pulls) for copy in copies)])
+    dense = np.concatenate([clean, *(denoise_points(sdf, frame, copy, shape, pulls) for copy in copies)])
+    return denoise_points(sdf, frame, dense, shape, pulls, even) if even else dense

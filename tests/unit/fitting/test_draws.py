@@ -78,8 +78,19 @@ def test_repeated_and_far_points_take_no_part():
     cloud = np.random.default_rng(0).normal(size=(300, 3))
     cloud /= np.linalg.norm(cloud, axis=1, keepdims=True)
     data = ObservationsDataModule([[np.concatenate([cloud, cloud[:50], [[900.0, 0, 0]]])]])
-    assert data.left_out == [51] and len(data.shapes[0][0]) == 300
+    assert data.left_out == [51] and data.outliers == [1] and len(data.shapes[0][0]) == 300
     assert data.frames[0].scale < 1.1
+
+
+def test_each_observation_is_judged_by_itself():
+    random = np.random.default_rng(0)
+    fine, coarse = (random.normal(size=(count, 3)) for count in (5000, 600))
+    fine /= np.linalg.norm(fine, axis=1, keepdims=True)
+    coarse *= (1 + 0.05 * random.normal(size=(600, 1))) / np.linalg.norm(coarse, axis=1, keepdims=True)
+    stray = np.array([[0.0, 0, 0], [2.2, 0, 0]])
+    # Among the fine ones the coarse ones would be strays, too.
+    data = ObservationsDataModule([[fine, np.concatenate([coarse, stray])]])
+    assert data.outliers == [2] and [len(cloud) for cloud in data.shapes[0]] == [5000, 600]
 
 
 def test_the_fingerprint_is_of_the_content():

@@ -146,6 +146,41 @@ def test_upsampling_works_at_utm_coordinates(far_ball, noisy):
     assert np.abs(_radius(more, UTM) - 20).max() < 1e-3
 
 
+def _gaps(points, centre=0.0):
+    """Distances to the nearest neighbour, as multiples of that in a hexagonal packing of the sphere."""
+    area = 4 * np.pi * _radius(points, centre).mean() ** 2
+    return cKDTree(points).query(points, 2)[0][:, 1] / np.sqrt(2 / np.sqrt(3) * area / len(points))
+
+
+def test_even_points_lie_on_the_sphere_in_their_order_and_far_apart(ball, noisy):
+    clean, even = ball.denoise(noisy), ball.denoise(noisy, even=True)
+    assert even.shape == noisy.shape and even.dtype == np.float64
+    assert np.abs(_radius(even) - 1).max() < 1e-6
+    spacing = np.sqrt(4 * np.pi / 400)
+    moved = np.linalg.norm(even - clean, axis=1)
+    assert moved.mean() < spacing and moved.max() < 3 * spacing
+    assert _gaps(clean).mean() < 0.55 and _gaps(even).mean() > 0.85 and _gaps(even).min() > 0.5
+
+
+@pytest.mark.parametrize("rate", [1, 4])
+def test_upsampled_points_can_be_even(ball, noisy, rate):
+    even = ball.upsample(noisy, rate, even=True)
+    assert even.shape == (rate * 400, 3) and np.abs(_radius(even) - 1).max() < 1e-6
+    assert _gaps(even).mean() > 0.85 and _gaps(even).min() > 0.45
+    if rate == 1:
+        assert np.allclose(even, ball.denoise(noisy, even=True), atol=1e-5)
+
+
+def test_even_points_come_back_to_utm_coordinates(far_ball, noisy):
+    even = far_ball.denoise(UTM + 20 * noisy, even=True)
+    assert np.abs(_radius(even, UTM) - 20).max() < 1e-4 and _gaps(even, UTM).mean() > 0.85
+
+
+def test_each_shape_spreads_on_its_own_surface(noisy):
+    field = Field(Spheres(), [Frame((0.0, 0.0, 0.0), 1.0)] * 3, {"architecture": {"name": "ball"}, "pulls": 3})
+    assert np.allclose(_radius(field.denoise(noisy, shape=1, even=True)), 0.4, atol=1e-6)
+
+
 def test_sdf_at_is_the_distance_in_world_units(far_ball, noisy):
     distance = far_ball.sdf_at(UTM + 20 * noisy)
     assert distance.shape == (400,) and distance.dtype == np.float64
