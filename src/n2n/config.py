@@ -56,6 +56,7 @@ class Config:
         plan_reuse: Optimiser steps per matching; auto = fewer where a batch cannot hold all points.
         pairs: Observations of a pair: random (i, j) or same (i = j).
         scaffold: Build an oriented local fit before the fit (needed by the terms scaffold, far_field).
+        redistance: Make f a distance after the fit; its zero set stays.
         checkpoint_every: Iterations between checkpoints.
         pulls: Times F is applied to denoise a point.
         terms: Further weighted terms of the loss: name -> {weight, arguments}.
@@ -71,6 +72,7 @@ class Config:
     plan_reuse: Any = 1
     pairs: str = "random"
     scaffold: bool = False
+    redistance: bool = False
     checkpoint_every: int = 1000
     pulls: int = 3
     queries: QueriesConfig = field(default_factory=QueriesConfig)

@@ -46,6 +46,9 @@ class SDF(nn.Module):
         """Say where the surface may lie: within `radius` of the points. `roughness` is measured there."""
         self._bands = {**getattr(self, "_bands", {}), condition: (points, radius)}
 
+    def adapt_roughness(self) -> None:
+        """Let `roughness` count less where the field bends now, where an architecture can tell; a network cannot."""
+
     def roughness(self, generator: torch.Generator | None = None) -> Tensor:
         """Return the integral of ||Hessian f||^2 over the band, estimated from differences of the gradient.
 

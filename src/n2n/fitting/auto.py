@@ -18,9 +18,9 @@ from n2n.geometry.scale import Scales, estimate_scales
 
 _PROBED_POINTS = 20_000
 _NOISE_FLOOR = 0.05  # of the spacing: a clean cloud still has one length that limits what can be known
-_VOXEL = 0.33
+_VOXEL = 0.28
 _STIFFNESS = 1.75
-_THIN_PLATE = 8e-3
+_THIN_PLATE = 0.011
 _FAR_FIELD = 60.0
 _MAX_CELLS = 3e6  # a whole street in one grid would need more; it gets a coarser one instead
 _BAND_VOXELS = 3.0

@@ -23,9 +23,11 @@ from n2n.fitting.callbacks import ProgressReport, Report
 from n2n.fitting.checkpoint import AtomicCheckpointIO, read_state
 from n2n.fitting.module import FitModule
 from n2n.fitting.prepare import fill_config, prepare
+from n2n.fitting.redistance import redistance
 from n2n.geometry.frame import Frame
 
 LAST_CHECKPOINT = "last.ckpt"
+_REDISTANCE_STEPS = 100
 _LOGGED = 1000  # rows of the log, at most twice as many
 
 
@@ -114,6 +116,10 @@ def fit(
         else:
             module.load_state_dict(read_state(resume)["state_dict"])
     field = module.field.eval().to(device)
+    if config["redistance"]:
+        boxes = [(shape.chosen.lower, shape.chosen.upper) for shape in shapes]
+        voxel = min(shape.chosen.voxel for shape in shapes)
+        redistance(field, boxes, voxel, config["optimizer"]["lr"], min(iterations, _REDISTANCE_STEPS), seed)
     return FitResult(
         field=field,
         frames=data.frames,

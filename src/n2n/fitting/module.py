@@ -54,7 +54,7 @@ class FitModule(L.LightningModule):
         first = self.global_step
         generator = torch.Generator().manual_seed(self.seed * 1_000_003 + first)
         optimizer, scheduler = self.optimizers(), self.lr_schedulers()
-        block = self.objective.begin(self.field, draw, generator)
+        block = self.objective.begin(self.field, draw, generator, first / self.iterations)
         for iteration in range(first, min(first + self.plan_reuse, self.iterations)):
             optimizer.zero_grad()
             with self.field.shared():

@@ -56,8 +56,11 @@ class Objective:
         self._wants_denoised = any(getattr(term, "needs_denoised", False) for _, term in self.terms.values())
 
     @torch.no_grad()
-    def begin(self, field: Any, draw: Draw, generator: torch.Generator) -> Block:
-        """Draw queries and targets and match them under the present field (Eq. 4)."""
+    def begin(self, field: Any, draw: Draw, generator: torch.Generator, progress: float = 0.0) -> Block:
+        """Draw queries and targets and match them under the present field (Eq. 4); tell the terms that ask for it."""
+        for _, term in self.terms.values():
+            if hasattr(term, "begin"):
+                term.begin(field, progress)
         candidates = self.queries(draw.source, generator, draw.key)
         # Queries that are the targets themselves would be matched to where they already are.
         tied = draw.same and self.queries.kind != "observation"

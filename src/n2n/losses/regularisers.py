@@ -1,5 +1,7 @@
 """The regulariser R of Eq. 7 and its variants: pure terms that look at one `FieldState`."""
 
+from typing import Any
+
 import torch
 from jaxtyping import Float
 from torch import Tensor
@@ -101,7 +103,20 @@ class OnSurface:
 
 
 class Smoothness:
-    """Thin-plate energy of the field around the surface: the integral of ||Hessian f||^2 over the field's band."""
+    """Thin-plate energy of the field around the surface: the integral of ||Hessian f||^2 over the field's band.
+
+    Args:
+        adapt_from: Share of the fit after which the energy counts less where the field bends already, so that edges
+            stay and flat parts become flat; 1 for never. Known to the grid only.
+    """
+
+    def __init__(self, adapt_from: float = 1.0) -> None:
+        self.adapt_from = adapt_from
+
+    def begin(self, field: Any, progress: float) -> None:
+        """Look at the field anew, once per matching."""
+        if progress >= self.adapt_from:
+            field.adapt_roughness()
 
     def __call__(self, state: FieldState) -> Tensor:
         return state.field.roughness(state.generator)

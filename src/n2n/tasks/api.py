@@ -90,6 +90,8 @@ def fit_clouds(
 ) -> Field:
     """Fit one shape's observations, already checked, with a composed configuration."""
     data = ObservationsDataModule([clouds], config["num_observations"])
+    if run_dir:
+        Path(run_dir).mkdir(parents=True, exist_ok=True)
     result = Field.of(fit_data(data, config, Path(run_dir) if run_dir else None, report))
     if run_dir:
         result.save(run_dir)

@@ -155,10 +155,10 @@ def test_merged_observations_know_the_surface_better_than_one():
     surface = sample_surface("sphere", 300, seed=9)
     settings = ["iterations=60", "batch_size=1600"]
     one, eight = (_at(_fit(clouds[:count], *settings), surface).abs().mean() for count in (1, 8))
-    assert eight < 0.6 * one
+    assert eight < 0.7 * one
 
 
-@pytest.mark.parametrize("overrides", [["iterations=60"], ["architecture=mlp", *TINY["mlp"]]])
+@pytest.mark.parametrize("overrides", [["iterations=60"], ["architecture=mlp", "redistance=false", *TINY["mlp"]]])
 def test_two_shapes_in_one_field(overrides):
     # The centre tells them apart: inside the sphere, in the hole of the torus, which is scaled and far away.
     shapes = [[scan("sphere", 400, 0.01)], [20 * scan("torus", 400, 0.01) + [1000, 0, 0]]]
