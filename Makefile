@@ -10,10 +10,10 @@ CPU_INDEX := https://download.pytorch.org/whl/cpu
 PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3.14 python3 python; do \
 	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && { echo $$p; break; }; done)
 
-.PHONY: help setup demo test check format clean FORCE
+.PHONY: help setup demo test check format bench bench-docs clean FORCE
 
 help:  ## this list
-	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 10
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
 	@echo
 	@echo "NVIDIA GPU: make setup TORCH=torch     (without TORCH a CPU build is installed, no CUDA packages)"
 
@@ -33,6 +33,12 @@ check: $(STAMP)  ## style and import layers
 format: $(STAMP)  ## rewrite the sources in house style
 	@$(BIN)/ruff check --fix .
 	@$(BIN)/ruff format .
+
+bench: $(STAMP)  ## measure everything, about 15 minutes; BENCH="matching step" only these, BENCH=--help tells more
+	@$(BIN)/python -m benchmarks $(BENCH)
+
+bench-docs: $(STAMP)  ## copy the report of `make bench` to docs/benchmarks.md
+	@$(BIN)/python -m benchmarks --docs
 
 clean:  ## remove .venv and caches, keep results
 	rm -rf $(VENV) .pytest_cache .ruff_cache .import_linter_cache .hypothesis
