@@ -34,11 +34,13 @@ class QueriesConfig:
     kind: str = "observation"
     neighbour: int = 50
     scale: Any = 1.0
+    pulls: int = 0
 
     def __post_init__(self) -> None:
         _one_of("queries.kind", self.kind, ("auto", "observation", "neighbour", "jitter"))
         self.neighbour = _whole("queries.neighbour", self.neighbour, 1)
         _at_least("queries.scale", self.scale, 0)
+        self.pulls = _whole("queries.pulls", self.pulls, 0)
 
 
 @dataclass
@@ -56,6 +58,8 @@ class Config:
         plan_reuse: Optimiser steps per matching; auto = fewer where a batch cannot hold all points.
         pairs: Observations of a pair: random (i, j) or same (i = j).
         scaffold: Build an oriented local fit before the fit (needed by the terms scaffold, far_field).
+        target_noise: Noise whose outward shift, on a curved surface, is taken off the targets; unit coordinates.
+        average_from: Share of the fit from which on the weights are averaged; 1 for never.
         redistance: Make f a distance after the fit; its zero set stays.
         checkpoint_every: Iterations between checkpoints.
         pulls: Times F is applied to denoise a point.
@@ -73,6 +77,8 @@ class Config:
     pairs: str = "random"
     scaffold: bool = False
     redistance: bool = False
+    target_noise: Any = 0.0
+    average_from: float = 1.0
     checkpoint_every: int = 1000
     pulls: int = 3
     queries: QueriesConfig = field(default_factory=QueriesConfig)
@@ -97,6 +103,8 @@ class Config:
             if key != "num_observations" or self.num_observations is not None:
                 setattr(self, key, _whole(key, getattr(self, key), lowest))
         check_seed(self.seed)
+        _at_least("target_noise", self.target_noise, 0)
+        _at_least("average_from", self.average_from, 0)
         for name, spec in self.terms.items():
             if spec is not None:
                 if not isinstance(spec, dict):

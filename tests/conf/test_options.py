@@ -65,7 +65,8 @@ def test_the_paper_recipe_is_the_paper(task, weight, batch):
     assert config["optimizer"]["_target_"] == "torch.optim.Adam" and config["optimizer"]["lr"] == 1e-4
     assert config["iterations"] == 800_000
     assert config["plan_reuse"] == 1 and config["terms"] == {} and config["num_observations"] is None
-    assert config["queries"] == {"kind": "auto", "neighbour": 50, "scale": 1.0}
+    assert config["queries"] == {"kind": "auto", "neighbour": 50, "scale": 1.0, "pulls": 0}
+    assert config["target_noise"] == 0 and config["average_from"] == 1 and config["redistance"] is False
 
 
 def test_the_released_script_differs_where_it_does():

@@ -33,6 +33,7 @@ def build_objective(config: dict[str, Any], guides: list[Guide | None]) -> Objec
         queries=QuerySampler(**config["queries"]),
         terms=terms,
         guides=guides,
+        target_noise=config["target_noise"],
     )
 
 

@@ -73,6 +73,8 @@ class Chosen:
             "batch_size": min(self.batch_size, _GLOBAL_BATCH) if unsorted else self.batch_size,
             "plan_reuse": self.plan_reuse,
             "queries.kind": "neighbour" if self.observations == 1 else "observation",
+            # Of one cloud the curvature is known too badly to be trusted in full.
+            "target_noise": self.noise * (1 + self.spacing / self.noise) ** -0.5,
             "queries.scale": 0.5 * self.noise,
             "architecture.voxel": self.voxel,
             "terms.eikonal.weight": stiffness * unit,

@@ -82,7 +82,9 @@ def fit(
     objective = build_objective(config, [shape.guide(device, seed) for shape in shapes])
     optimizer, scheduler = build_optimizer(config)
     iterations, plan_reuse = config["iterations"], config["plan_reuse"]
-    module = FitModule(field, objective, optimizer, scheduler, iterations, plan_reuse, seed, identity)
+    module = FitModule(
+        field, objective, optimizer, scheduler, iterations, plan_reuse, seed, config["average_from"], identity
+    )
     prepared = time.perf_counter()
 
     resume = _resume_from(run_dir)
@@ -115,7 +117,7 @@ def fit(
             _train(trainer, module, data, resume)
         else:
             module.load_state_dict(read_state(resume)["state_dict"])
-    field = module.field.eval().to(device)
+    field = module.result.eval().to(device)
     if config["redistance"]:
         boxes = [(shape.chosen.lower, shape.chosen.upper) for shape in shapes]
         voxel = min(shape.chosen.voxel for shape in shapes)

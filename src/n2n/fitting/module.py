@@ -5,6 +5,7 @@ from typing import Any
 
 import lightning as L
 import torch
+from torch.optim.swa_utils import AveragedModel
 
 from n2n.architectures.base import SDF
 from n2n.datamodules.observations import Draw
@@ -23,6 +24,8 @@ class FitModule(L.LightningModule):
         plan_reuse: Optimiser steps per matching, >= 1.
         seed: Every block draws from a generator of its own, seeded by this and its first iteration, so a resumed fit
             draws what an undisturbed one would have drawn.
+        average_from: Share of the fit from which on the weights are averaged: every matching sees other points, and the
+            last one would count most. 1 for never.
         identity: Names data and configuration in checkpoints, so that only the same fit is resumed.
     """
 
@@ -35,6 +38,7 @@ class FitModule(L.LightningModule):
         iterations: int,
         plan_reuse: int = 1,
         seed: int = 0,
+        average_from: float = 1.0,
         identity: str = "",
     ) -> None:
         super().__init__()
@@ -42,6 +46,13 @@ class FitModule(L.LightningModule):
         self.field, self.objective = field, objective
         self._optimizer, self._scheduler = optimizer, scheduler
         self.iterations, self.plan_reuse, self.seed, self.identity = iterations, plan_reuse, seed, identity
+        self._average_from = average_from
+        self._averaged = AveragedModel(field) if average_from < 1 else None
+
+    @property
+    def result(self) -> SDF:
+        """The field of the averaged weights, where they were averaged."""
+        return self.field if self._averaged is None else self._averaged.module
 
     def configure_optimizers(self) -> dict[str, Any]:
         optimizer = self._optimizer(self.field.parameters())
@@ -62,5 +73,7 @@ class FitModule(L.LightningModule):
                 self.manual_backward(loss)
             optimizer.step()
             scheduler.step()
+            if self._averaged is not None and iteration >= self._average_from * self.iterations:
+                self._averaged.update_parameters(self.field)
         # Lightning would count blocks; `step` is its name for the x axis of every logger.
         self.log_dict({"loss": loss.detach(), **parts, "step": float(self.global_step)}, batch_size=1)

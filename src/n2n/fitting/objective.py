@@ -10,6 +10,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from n2n.datamodules.observations import Draw
+from n2n.geometry.curvature import curvature, noise_shift
 from n2n.geometry.point_to_plane import point_to_plane
 from n2n.geometry.pull import pull
 from n2n.geometry.sampling import QuerySampler
@@ -17,6 +18,8 @@ from n2n.losses.state import FieldState, Guide
 
 DENOISED_POINTS = 8192
 _FAR_POINTS = 2048
+_SETTLED = 0.25  # share of the fit after which the field's curvature means something
+_FOOT_PULLS = 2
 
 
 @dataclass
@@ -40,6 +43,7 @@ class Objective:
         queries: Where the field is asked.
         terms: name -> (weight, term); holds lambda R under `regulariser`.
         guides: One per shape, None where there is none; or empty.
+        target_noise: Deviation of the noise that `_unbiased` takes the shift of off the targets, unit coordinates.
     """
 
     def __init__(
@@ -49,10 +53,11 @@ class Objective:
         queries: QuerySampler,
         terms: dict[str, tuple[float, Any]],
         guides: Sequence[Guide | None] = (),
+        target_noise: float = 0.0,
     ) -> None:
         self.distance, self.pairing, self.queries = distance, pairing, queries
         self.terms = {name: (weight, term) for name, (weight, term) in terms.items() if weight}
-        self.guides = guides
+        self.guides, self.target_noise = guides, target_noise
         self._wants_denoised = any(getattr(term, "needs_denoised", False) for _, term in self.terms.values())
 
     @torch.no_grad()
@@ -67,6 +72,10 @@ class Objective:
         query_index, target_index = self.pairing(candidates, draw.target, generator, same=tied)
         queries, targets = candidates[query_index], draw.target[target_index]
         with field.shared():
+            if self.target_noise and progress >= _SETTLED:
+                targets = self._unbiased(field, targets.reshape(-1, 3), draw.condition).reshape(targets.shape)
+            for _ in range(self.queries.pulls):
+                queries = self._pull(field, queries.reshape(-1, 3), draw.condition).reshape(queries.shape)
             moved = self._pull(field, queries.reshape(-1, 3), draw.condition).reshape(queries.shape)
             plan = self.distance.match(moved, targets)
             denoised = self._denoise(field, draw, generator)
@@ -110,6 +119,21 @@ class Objective:
     def _evaluate(self, field: Any, points: Tensor, condition: int) -> tuple[Tensor, Tensor]:
         codes = torch.full((len(points),), condition, dtype=torch.long, device=points.device)
         return field.value_and_gradient(points, codes)
+
+    def _unbiased(self, field: Any, targets: Tensor, condition: int) -> Tensor:
+        """Move targets inwards by what noise shifts the points of a curved surface outwards on average.
+
+        Without this a surface fitted to many observations lies sigma^2 / r outside of a sphere.
+        """
+        foot = targets
+        for _ in range(_FOOT_PULLS):
+            foot = self._pull(field, foot, condition)
+
+        def gradient(points: Tensor) -> Tensor:
+            return self._evaluate(field, points, condition)[1]
+
+        shift = noise_shift(curvature(gradient, foot, self.target_noise), self.target_noise)
+        return targets - shift[:, None] * functional.normalize(gradient(foot), dim=-1)
 
     def _denoise(self, field: Any, draw: Draw, generator: torch.Generator) -> Tensor | None:
         """Pull many of the targets, if anything will look at them: for a large network that costs more than a step."""

@@ -26,14 +26,17 @@ class QuerySampler:
             `jitter` (Gaussian of one deviation everywhere).
         neighbour: k of `neighbour`.
         scale: Factor on the k-th distance, or the deviation of `jitter` in unit coordinates.
+        pulls: Times a query is pulled towards the surface before the loss looks at it (the caller does that). The loss
+            then no longer depends on how steep f is, and cannot be lowered by leaving noisy points where they are.
 
     Source: Ma et al. 2023, Sec. 3 and App. B; Ma et al. 2021 (NeuralPull), Sec. 3.
     """
 
-    def __init__(self, kind: str = "observation", neighbour: int = 50, scale: float = 1.0) -> None:
+    def __init__(self, kind: str = "observation", neighbour: int = 50, scale: float = 1.0, pulls: int = 0) -> None:
         if kind not in QUERY_KINDS:
             raise ConfigError(f"Unknown queries.kind {kind!r}. Known: {', '.join(QUERY_KINDS)}.")
         self.kind, self.neighbour, self.scale = kind, neighbour, float(scale)
+        self.pulls = pulls
         self._deviation: dict[int, Tensor] = {}
 
     def __call__(self, points: Points, generator: torch.Generator, key: int | None = None) -> Points:
