@@ -39,7 +39,7 @@ def test_the_result_is_plain():
         ),
         (
             "queries.knd=auto",
-            "Unknown configuration key 'queries.knd'. Did you mean 'kind'? Known: kind, neighbour, scale, pulls.",
+            "Unknown configuration key 'queries.knd'. Did you mean 'kind'? Known: kind, neighbour, pulls, scale.",
         ),
         ("terms.eikonal.att=1", "regulariser 'eikonal' has no argument 'att'. Did you mean 'at'? Known: at."),
         ("terms.eikonal=1", "terms.eikonal=1 is not a term; give its weight as terms.eikonal.weight=..."),
