@@ -59,6 +59,7 @@ class Config:
         pairs: Observations of a pair: random (i, j) or same (i = j).
         scaffold: Build an oriented local fit before the fit (needed by the terms scaffold, far_field).
         target_noise: Noise whose outward shift, on a curved surface, is taken off the targets; unit coordinates.
+        effort: Factor on the iterations that `auto` chooses.
         average_from: Share of the fit from which on the weights are averaged; 1 for never.
         redistance: Make f a distance after the fit; its zero set stays.
         checkpoint_every: Iterations between checkpoints.
@@ -79,6 +80,7 @@ class Config:
     redistance: bool = False
     target_noise: Any = 0.0
     average_from: float = 1.0
+    effort: float = 1.0
     checkpoint_every: int = 1000
     pulls: int = 3
     queries: QueriesConfig = field(default_factory=QueriesConfig)
@@ -105,6 +107,7 @@ class Config:
         check_seed(self.seed)
         _at_least("target_noise", self.target_noise, 0)
         _at_least("average_from", self.average_from, 0)
+        _at_least("effort", self.effort, 0)
         for name, spec in self.terms.items():
             if spec is not None:
                 if not isinstance(spec, dict):

@@ -41,6 +41,9 @@ _TASKS = {
 }
 
 
+QUALITIES = {"draft": 0.4, "normal": 1.0, "best": 3.0}  # factor on the iterations
+
+
 class _Parser(argparse.ArgumentParser):
     """A parser whose complaints are one line like every other error, not a usage text and a line."""
 
@@ -111,6 +114,9 @@ def _add_task(commands: argparse._SubParsersAction, task: str, summary: str, exa
         command.add_argument(
             "--remove-outliers", action="store_true", help="leave out points that look like outliers (they are kept)"
         )
+    command.add_argument(
+        "--quality", default="normal", choices=list(QUALITIES), help="less or more of the machine's time (normal)"
+    )
     command.add_argument("--preview", metavar="PNG", help="also draw before and after")
     command.add_argument("--run", metavar="RUN", help="use the field of a run folder, no new fit")
     command.add_argument(

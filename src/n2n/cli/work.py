@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from n2n.cli.arguments import QUALITIES
 from n2n.cli.console import progress_bar, say
 from n2n.cli.inputs import Input, read_inputs, remarks, split_overrides
 from n2n.cli.outputs import check_preview, new_folder, plan_outputs
@@ -33,6 +34,8 @@ def run_work(options: argparse.Namespace) -> int:
         raise ConfigError(
             f"{overrides[0]} has no effect on a finished run; leave it out, or leave out --run to fit anew"
         )
+    if options.run and options.quality != "normal":
+        raise ConfigError(f"--quality {options.quality} has no effect on a finished run; leave it or --run out")
     extensions = MESH_EXTENSIONS_WRITE if task == "reconstruct" else CLOUD_EXTENSIONS_WRITE
     outputs = plan_outputs(options.output, paths, extensions, per_input=task != "reconstruct")
     if options.preview:
@@ -95,7 +98,8 @@ def _configure(options: argparse.Namespace, overrides: list[str]) -> dict[str, A
     for text in overrides:
         if (key := re.split(r"[.=]", text.lstrip("+~"))[0]) in _ONLY_FIT:
             raise ConfigError(f"{text} has no effect here: {key} belongs to runs that are kept; use it with `n2n fit`")
-    config = compose([f"task={options.command}", f"device={options.device}", f"seed={options.seed}", *overrides])
+    chosen = [f"device={options.device}", f"seed={options.seed}", f"effort={QUALITIES[options.quality]}"]
+    config = compose([f"task={options.command}", *chosen, *overrides])
     pick_device(config["device"])
     options.seed = config["seed"]
     return config

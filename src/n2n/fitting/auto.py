@@ -16,15 +16,17 @@ from n2n.errors import ConfigError
 from n2n.fitting.objective import DENOISED_POINTS
 from n2n.geometry.scale import Scales, estimate_scales
 
-_PROBED_POINTS = 20_000
+_PROBED_POINTS = 40_000
 _NOISE_FLOOR = 0.05  # of the spacing: a clean cloud still has one length that limits what can be known
 _VOXEL = 0.28
 _STIFFNESS = 1.75
 _THIN_PLATE = 0.011
+_UNFOLDED = 0.3  # where the noise is thicker than the cells: f must not fold inside it
 _FAR_FIELD = 60.0
 _MAX_CELLS = 3e6  # a whole street in one grid would need more; it gets a coarser one instead
 _BAND_VOXELS = 3.0
 _MAX_BATCH = 32_768
+_SEEN_BATCHES = 16  # over which the weights are averaged: more points than these are not seen often enough to count
 _GLOBAL_BATCH = 1000  # matched as one leaf: its cost grows with the cube
 _PLAN_REUSE = 20
 _GRID_ITERATIONS, _GRID_RATE = 160, 0.02
@@ -37,7 +39,7 @@ class Chosen:
 
     Attributes:
         noise: Deviation of the noise along the normal, at least 5 % of the spacing.
-        spacing: Square root of the area per point over all observations.
+        spacing: Square root of the area per point over all observations, of those the fit sees at its end.
         area: Surface area.
         lower, upper: Box of the field.
         voxel: Finest cell of the grid.
@@ -46,6 +48,7 @@ class Chosen:
         batch_size: Points matched at once.
         plan_reuse: Optimiser steps per matching: fewer where one batch does not hold all points.
         observations: N.
+        merged: Observations that the fit sees while weights are averaged, at most N.
     """
 
     noise: float
@@ -59,6 +62,7 @@ class Chosen:
     batch_size: int
     plan_reuse: int
     observations: int
+    merged: float
 
     def values(self, config: dict[str, Any]) -> dict[str, Any]:
         """Return the values of the configuration's `auto` fields by dotted name."""
@@ -67,18 +71,23 @@ class Chosen:
         unit = self.noise ** (config["distance"].get("p", 1) - 2)
         unsorted = config["pairing"].get("name") == "global"
         linear = config["architecture"].get("name") == "grid"
+        # A fold of f to and fro inside the noise gains a share of noise^2 / area, less the more points are there, and
+        # costs 1 / voxel of bending.
+        unfolded = _UNFOLDED * self.noise * self.voxel / self.merged**0.5
+        smoothness = max(_THIN_PLATE * self.spacing, unfolded) * self.noise / self.area
+        effort = config["effort"]
         return {
-            "iterations": _GRID_ITERATIONS if linear else _NETWORK_ITERATIONS,
+            "iterations": max(1, round(effort * (_GRID_ITERATIONS if linear else _NETWORK_ITERATIONS))),
             "optimizer.lr": _GRID_RATE if linear else _NETWORK_RATE,
             "batch_size": min(self.batch_size, _GLOBAL_BATCH) if unsorted else self.batch_size,
-            "plan_reuse": self.plan_reuse,
+            "plan_reuse": max(1, round(min(1.0, effort) * self.plan_reuse)),
             "queries.kind": "neighbour" if self.observations == 1 else "observation",
             # Of one cloud the curvature is known too badly to be trusted in full.
             "target_noise": self.noise * (1 + self.spacing / self.noise) ** -0.5,
             "queries.scale": 0.5 * self.noise,
             "architecture.voxel": self.voxel,
             "terms.eikonal.weight": stiffness * unit,
-            "terms.smoothness.weight": _THIN_PLATE * self.noise * self.spacing / self.area * unit,
+            "terms.smoothness.weight": smoothness * unit,
             "terms.scaffold.weight": unit,
             "terms.scaffold.normal_weight": stiffness,
             "terms.far_field.weight": _FAR_FIELD * self.noise**2 * unit,
@@ -89,7 +98,7 @@ def measure(observations: list[NDArray[np.float64]], seed: int = 0) -> tuple[Sca
     """Estimate the scales of all observations together from a sample of them.
 
     Returns:
-        Scales with the spacing of the *merged* observations, and the sample (at most 20 000 points).
+        Scales with the spacing of the *merged* observations, and the sample (at most 40 000 points).
     """
     generator = np.random.default_rng(seed)
     chosen: list[NDArray[np.float64]] = []
@@ -110,13 +119,15 @@ def choose(scales: Scales, observations: list[NDArray[np.float64]]) -> Chosen:
     noise = max(scales.noise, _NOISE_FLOOR * scales.spacing)
     pad = max(0.12, 4 * noise, scales.spacing)
     total = sum(map(len, observations))
+    seen = min(total, _SEEN_BATCHES * _MAX_BATCH)
     sampled = min(DENOISED_POINTS, max(map(len, observations)))
     lower = np.min([points.min(axis=0) for points in observations], axis=0) - pad
     upper = np.max([points.max(axis=0) for points in observations], axis=0) + pad
-    voxel = max(_VOXEL * (noise * scales.spacing) ** 0.25, float(np.prod(upper - lower) / _MAX_CELLS) ** (1 / 3))
+    spacing = float(np.sqrt(scales.area / seen))
+    voxel = max(_VOXEL * (noise * spacing) ** 0.25, float(np.prod(upper - lower) / _MAX_CELLS) ** (1 / 3))
     return Chosen(
         noise=noise,
-        spacing=scales.spacing,
+        spacing=spacing,
         area=scales.area,
         lower=tuple(float(x) for x in lower),
         upper=tuple(float(x) for x in upper),
@@ -126,6 +137,7 @@ def choose(scales: Scales, observations: list[NDArray[np.float64]]) -> Chosen:
         batch_size=min(total, _MAX_BATCH),
         plan_reuse=int(np.clip(_PLAN_REUSE * _MAX_BATCH // total, 4, _PLAN_REUSE)),
         observations=len(observations),
+        merged=len(observations) * seen / total,
     )
 
 

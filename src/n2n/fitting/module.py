@@ -52,7 +52,7 @@ class FitModule(L.LightningModule):
     @property
     def result(self) -> SDF:
         """The field of the averaged weights, where they were averaged."""
-        return self.field if self._averaged is None else self._averaged.module
+        return self._averaged.module if self._averaged is not None and self._averaged.n_averaged else self.field
 
     def configure_optimizers(self) -> dict[str, Any]:
         optimizer = self._optimizer(self.field.parameters())

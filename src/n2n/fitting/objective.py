@@ -152,6 +152,8 @@ class Objective:
             return None
         normals = functional.normalize(self._evaluate(field, denoised, draw.condition)[1], dim=-1)
         distance = point_to_plane(guide.far_points, denoised, normals, math.sqrt(guide.area / len(denoised)))
+        if guide.far_lids is not None:
+            distance = torch.minimum(distance, guide.far_lids)
         return guide.far_points, guide.far_signs * distance
 
 

@@ -45,12 +45,12 @@ class Shape:
         if self.scaffold is None:
             return None
         chosen, scaffold = self.chosen, self.scaffold
-        far, signs = scaffold.far_field(self.sample, chosen.lower, chosen.upper, chosen.margin, seed)
-        parts = (
+        far, signs, lids = scaffold.far_field(self.sample, chosen.lower, chosen.upper, chosen.margin, seed)
+        points, normals, far, signs, lids = (
             torch.as_tensor(x, dtype=torch.float32, device=device)
-            for x in (scaffold.points, scaffold.normals, far, signs)
+            for x in (scaffold.points, scaffold.normals, far, signs, lids)
         )
-        return Guide(*parts, area=chosen.area)
+        return Guide(points, normals, far, signs, chosen.area, lids)
 
 
 def prepare(data: ObservationsDataModule, config: dict[str, Any]) -> list[Shape]:

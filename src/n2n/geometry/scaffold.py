@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,8 @@ from n2n.geometry.scale import Scales
 _MAX_POINTS = 3000
 _AREA_NEIGHBOURS = 9
 _FAR_POSITIONS = 20_000
+_OPEN = 0.3  # mean normal of a surface that is clearly not closed
+_LOWEST_OPEN, _LOWEST = 0.05, 0.4  # levels; far from everything is outside
 _NEAR = 1.5  # sample spacings; closer than that a sample's plane says more than its distance
 
 
@@ -52,7 +55,22 @@ class Scaffold:
 
     def sign(self, queries: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return -1 where the winding number says inside and +1 elsewhere, (q,)."""
-        return np.where(winding_number(queries, self.points, self.normals, self.areas) > 0.5, -1.0, 1.0)
+        return np.where(self.winding(queries) > self.level, -1.0, 1.0)
+
+    def winding(self, queries: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the winding number at the queries, (q,)."""
+        return winding_number(queries, self.points, self.normals, self.areas)
+
+    @cached_property
+    def level(self) -> float:
+        """The winding number that separates inside from outside: the usual one on the surface itself.
+
+        Half for a closed surface, whose mean normal vanishes. For an open one it is less, and 0.5 lies on no surface: a
+        flat sheet would be outside on both sides.
+        """
+        flux = np.linalg.norm(self.areas @ self.normals) / self.areas.sum()
+        lowest = _LOWEST_OPEN if flux > _OPEN else _LOWEST
+        return float(np.clip(np.median(self.winding(self.points)), lowest, 0.5))
 
     def distance(self, queries: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return approximate signed distances (q,): to the plane of the nearest sample, or far off to the sample."""
@@ -64,11 +82,41 @@ class Scaffold:
 
     def far_field(
         self, cloud: NDArray[np.float64], lower: Sequence[float], upper: Sequence[float], margin: float, seed: int = 0
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return random positions of the box farther than `margin` from the cloud, (m, 3), and their signs, (m,)."""
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return random positions of the box far from the cloud, their signs, and how far off the lids are.
+
+        Where two positions of opposite sign are closer to each other than to the cloud, no data lie between them: the
+        surface is open there, and the winding number closes it with a lid. Without its distance, f would be told to
+        jump.
+
+        Returns:
+            Positions farther than `margin` from the cloud, (m, 3); -1 inside, +1 outside, (m,); distance to the
+            nearest point of a lid, (m,), infinite where there is none.
+        """
         positions = np.random.default_rng(seed).uniform(lower, upper, (_FAR_POSITIONS, 3))
-        positions = positions[cKDTree(cloud).query(positions)[0] > margin]
-        return positions, self.sign(positions)
+        off = cKDTree(cloud).query(positions)[0]
+        positions, off = positions[off > margin], off[off > margin]
+        above = self.winding(positions) - self.level
+        signs = np.where(above > 0, -1.0, 1.0)
+        lids = _lids(positions, above, off)
+        return positions, signs, cKDTree(lids).query(positions)[0] if len(lids) else np.full(len(positions), np.inf)
+
+
+def _lids(positions: NDArray[np.float64], above: NDArray[np.float64], off: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return points where `above` changes sign away from the data, (l, 3); none for a closed surface.
+
+    Args:
+        positions: (m, 3).
+        above: Winding numbers over their level, (m,).
+        off: Distances from the data, (m,).
+    """
+    inside, outside = np.flatnonzero(above > 0), np.flatnonzero(above <= 0)
+    if not len(inside) or not len(outside):
+        return positions[:0]
+    reach, other = cKDTree(positions[outside]).query(positions[inside])
+    a, b = inside[reach < off[inside]], outside[other[reach < off[inside]]]
+    share = above[a] / (above[a] - above[b])
+    return positions[a] + share[:, None] * (positions[b] - positions[a])
 
 
 def _thin(cloud: NDArray[np.float64], count: int, generator: np.random.Generator) -> NDArray[np.int64]:

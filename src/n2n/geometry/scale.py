@@ -5,10 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
+from scipy.special import gammaincinv
 
 _NEIGHBOURS = (12, 24, 48, 96, 192, 384)
 _PROBES = 500
 _PATCH_TO_NOISE = 2.75
+_LOCAL = 0.01  # of the points: most patches that hold more of them hold shape, too
+_WIDER = 1.05  # a patch of twice the points whose ratio grows by less counts shape as noise
 
 
 @dataclass(frozen=True)
@@ -32,7 +35,9 @@ def estimate_scales(points: NDArray[np.float64], seed: int = 0) -> Scales:
     """Estimate noise and spacing from quadric fits to local patches of growing size.
 
     A patch narrower than the noise looks like a ball and hides the noise; a patch much wider than the features counts
-    shape as noise. The residual is read where the patch first becomes 2.75 times as wide as the residual itself.
+    shape as noise. The residual is read where the patch first becomes 2.75 times as wide as the residual itself, else
+    where that ratio stops growing. Noise along one direction leaves many patches without any, so while patches are
+    small the median over all of them counts.
 
     Args:
         points: (n, 3), n >= 25.
@@ -47,10 +52,12 @@ def estimate_scales(points: NDArray[np.float64], seed: int = 0) -> Scales:
         distance, index = tree.query(probes, k)
         radius, residual = _quadric_residual(points[index])
         # The lower quartile: patches that hold an edge or two sheets inflate the mean, never the quartile.
-        noise = float(np.quantile(residual, 0.25) * (1 + 0.5 / np.sqrt(k)))
-        width = float(np.median(radius))
-        ratio = width / max(noise, 1e-12)
-        if ratio > best_ratio:
+        low, median = np.quantile(residual, [0.25, 0.5]) * (1 + 0.5 / np.sqrt(k))
+        ratio = float(np.median(radius) / max(low, 1e-12))
+        # The smallest patch has a ratio of 2 in any ball of noise, which says nothing.
+        if ratio > _WIDER * best_ratio or best[2] == sizes[0]:
+            # Of small patches the median, as the lower quartile that Gaussian noise of this median would have.
+            noise = float(median * _quartile_to_median(k - 6) if k <= _LOCAL * len(points) else low)
             # Area per point from the smallest disc that holds the k - 1 points around each probe.
             spacing = np.sqrt(np.pi * np.median(distance[:, -1]) ** 2 / (k - 1))
             best, best_ratio = (noise, float(spacing), k), ratio
@@ -58,6 +65,12 @@ def estimate_scales(points: NDArray[np.float64], seed: int = 0) -> Scales:
             break
     noise, spacing, patch = best
     return Scales(noise, spacing, patch, spacing**2 * len(points))
+
+
+def _quartile_to_median(degrees: int) -> float:
+    """Return lower quartile over median of the root of a chi-squared variable."""
+    low, median = gammaincinv(max(degrees, 1) / 2, [0.25, 0.5])
+    return float(np.sqrt(low / median))
 
 
 def _quadric_residual(patches: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -20,6 +20,7 @@ class Guide:
         far_points: Positions of the box that are clearly off the surface, (m, 3).
         far_signs: -1 inside, +1 outside, (m,).
         area: Surface area.
+        far_lids: Distances of the far points to where the surface is closed without data, (m,); infinite for nowhere.
     """
 
     points: Points
@@ -27,6 +28,7 @@ class Guide:
     far_points: Float[Tensor, "m 3"]
     far_signs: Float[Tensor, " m"]
     area: float
+    far_lids: Float[Tensor, " m"] | None = None
 
 
 @dataclass

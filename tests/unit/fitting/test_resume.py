@@ -67,6 +67,21 @@ def test_resuming_changes_nothing(tmp_path, recipe):
     _assert_equal(resumed, _whole(recipe))
 
 
+def test_a_half_done_average_goes_on(tmp_path):
+    # Both averaging and adapting have begun when the fit stops; without redistancing, which comes after the average.
+    config = _config("fast", "average_from=0.2", "terms.smoothness.adapt_from=0.2", "redistance=false")
+    _interrupted(config, tmp_path, 30)
+    state = torch.load(tmp_path / LAST_CHECKPOINT, weights_only=True)
+    assert state["global_step"] == 20 and state["state_dict"]["_averaged.n_averaged"] == 12
+    resumed, whole = fit(_data(), config, tmp_path), fit(_data(), config)
+    assert resumed.report["resumed_at"] == 20
+    _assert_equal(resumed, whole)
+    # The last state of the same fit, and an average that had forgotten its first part, would be others.
+    for later in (1.0, 0.5):
+        other = fit(_data(), {**config, "average_from": later})
+        assert not torch.equal(other.field.levels[-1], whole.field.levels[-1])
+
+
 def test_resuming_twice_changes_nothing(tmp_path):
     _interrupted(_config(), tmp_path, 20)
     _interrupted(_config(), tmp_path, 30)

@@ -210,3 +210,24 @@ def test_smoothness_of_a_sphere_follows_its_curvature():
 def test_smoothness_without_a_band_says_what_to_call():
     with pytest.raises(RuntimeError, match="set_band"):
         Smoothness()(_state(Ball(), _points()))
+
+
+@pytest.mark.parametrize(("adapt_from", "adapted"), [(0.5, [0.5, 0.75]), (0.0, [0.0, 0.49, 0.5, 0.75]), (1.0, [])])
+def test_smoothness_adapts_from_its_share_of_the_fit_on(adapt_from, adapted):
+    class Spy(Ball):
+        def adapt_roughness(self):
+            seen.append(progress)
+
+    seen, term = [], Smoothness(adapt_from)
+    for progress in (0.0, 0.49, 0.5, 0.75):
+        term.begin(Spy(), progress)
+    assert seen == adapted
+    assert Smoothness().adapt_from == 1
+
+
+def test_a_field_that_cannot_adapt_keeps_its_energy():
+    field = Ball(0.5)
+    field.set_band(_sphere(0.5), 0.05)
+    before = field.roughness(torch.Generator().manual_seed(0))
+    Smoothness(0.5).begin(field, 0.6)
+    assert torch.equal(field.roughness(torch.Generator().manual_seed(0)), before)

@@ -1,5 +1,7 @@
 """Fitted fields on disk, and `n2n.fit` from arrays to a field."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import torch
@@ -109,6 +111,13 @@ def test_fit_takes_an_array_and_keeps_the_field(tmp_path):
     assert np.array_equal(loaded.denoise(cloud), field.denoise(cloud))
     radius = np.linalg.norm(field.denoise(cloud) - [5e5, 5e6, 100], axis=1)
     assert np.abs(radius / 30 - 1).max() < 0.2
+
+
+@pytest.mark.parametrize("kind", [str, Path])
+def test_fit_makes_the_folder_it_is_given(tmp_path, kind):
+    cloud, folder = scan("sphere", 300, 0.02), tmp_path / "new" / "folder"
+    field = n2n.fit(cloud, overrides=[*SHORT, "redistance=false"], run_dir=kind(folder))
+    assert np.array_equal(n2n.Field.load(folder).sdf_at(cloud), field.sdf_at(cloud))
 
 
 def test_fit_takes_observations_of_different_size():
