@@ -207,6 +207,8 @@ BAD_REQUESTS = [
     (("reconstruct", "--run", "alien_run", "-o", "out.ply"), "cannot be read as an n2n field"),
     (("denoise", "--run", ".", "-o", "out.xyz"), "no input file given"),
     ((*MESH, "--run", ".", "seed=1"), "seed=1 has no effect on a finished run"),
+    ((*MESH, "--run", ".", "--quality", "best"), "--quality best has no effect on a finished run"),
+    ((*MESH, "--quality", "ultra"), "invalid choice: 'ultra'"),
     ((*DENOISE, "--shape", "1"), "--shape 1 chooses a shape of a run; give the run with --run"),
     # n2n fit.
     (("fit", "distance=emdd"), "Unknown distance 'emdd'. Did you mean 'emd'?"),
@@ -393,6 +395,12 @@ def test_even_spreads_the_points_along_the_surface_in_their_order(run_folder, n2
         assert np.linalg.norm(spread - plain, axis=1).mean() < spacing and off_surface(spread, UTM, 40) < 0.8
         gaps = [cKDTree(points).query(points, 2)[0][:, 1].mean() / spacing * rate**0.5 for points in (plain, spread)]
         assert gaps[0] < 0.65 and gaps[1] > 0.85  # a hexagonal packing has 1.07
+
+
+@pytest.mark.parametrize(("quality", "iterations"), [("draft", 64), ("normal", 160)])
+def test_quality_decides_how_long_it_takes(n2n, quality, iterations):
+    code, _, error = n2n("denoise", "scan.xyz", "-o", "out.xyz", "--quality", quality)
+    assert code == 0 and f"{iterations} iterations" in error
 
 
 def test_even_is_no_flag_of_reconstruct(n2n):

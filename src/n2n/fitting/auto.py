@@ -123,7 +123,7 @@ def choose(scales: Scales, observations: list[NDArray[np.float64]]) -> Chosen:
     sampled = min(DENOISED_POINTS, max(map(len, observations)))
     lower = np.min([points.min(axis=0) for points in observations], axis=0) - pad
     upper = np.max([points.max(axis=0) for points in observations], axis=0) + pad
-    spacing = float(np.sqrt(scales.area / seen))
+    spacing = scales.spacing * (total / seen) ** 0.5
     voxel = max(_VOXEL * (noise * spacing) ** 0.25, float(np.prod(upper - lower) / _MAX_CELLS) ** (1 / 3))
     return Chosen(
         noise=noise,

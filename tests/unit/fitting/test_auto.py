@@ -83,11 +83,11 @@ def test_observations_together_are_denser_than_one():
 
 
 def test_only_a_sample_of_many_points_is_measured():
-    clouds = [scan("sphere", 15_000, 0.02, seed) for seed in range(3)]
+    clouds = [scan("sphere", 15_000, 0.02, seed) for seed in range(4)]
     scales, pool = measure(clouds)
-    assert len(pool) == 20_000
+    assert len(pool) == 40_000
     assert scales.noise == pytest.approx(0.02, rel=0.25)
-    assert scales.spacing == pytest.approx(np.sqrt(4 * np.pi / 45_000), rel=0.1)
+    assert scales.spacing == pytest.approx(np.sqrt(4 * np.pi / 60_000), rel=0.1)
     assert measure(clouds)[0] == scales
 
 
@@ -97,3 +97,20 @@ def test_fill_replaces_auto_by_the_value_of_its_dotted_name():
     filled = fill(config, {"a": 1, "b.a": 2, "b.d": 9})
     assert filled == {"a": 1, "b": {"a": 2, "c": "automatic", "d": 3}, "a.b": 1, "e": None}
     assert config == before
+
+
+def test_effort_is_a_factor_on_the_iterations():
+    chosen, _ = _choose()
+    config = compose([])
+    plain, half, more = (chosen.values({**config, "effort": effort}) for effort in (1, 0.5, 3))
+    assert (half["iterations"], more["iterations"]) == (plain["iterations"] // 2, 3 * plain["iterations"])
+    assert half["plan_reuse"] == plain["plan_reuse"] // 2 and more["plan_reuse"] == plain["plan_reuse"]
+
+
+def test_more_points_than_the_fit_sees_do_not_make_finer_cells():
+    # 16 batches of 32 768 points are seen while the weights are averaged.
+    chosen, _ = _choose(spacing=0.004, count=5000, observations=400)
+    seen = 16 * 32_768
+    assert chosen.merged == pytest.approx(seen / 5000)
+    assert chosen.spacing == pytest.approx(0.004 * (400 * 5000 / seen) ** 0.5)
+    assert _choose(observations=8)[0].merged == 8
