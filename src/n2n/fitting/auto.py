@@ -21,7 +21,7 @@ _NOISE_FLOOR = 0.05  # of the spacing: a clean cloud still has one length that l
 _VOXEL = 0.28
 _STIFFNESS = 1.75
 _THIN_PLATE = 0.011
-_UNFOLDED = 0.3  # where the noise is thicker than the cells: f must not fold inside it
+_UNFOLDED = 0.3
 _FAR_FIELD = 60.0
 _MAX_CELLS = 3e6  # a whole street in one grid would need more; it gets a coarser one instead
 _BAND_VOXELS = 3.0
@@ -72,8 +72,9 @@ class Chosen:
         unsorted = config["pairing"].get("name") == "global"
         linear = config["architecture"].get("name") == "grid"
         # A fold of f to and fro inside the noise gains a share of noise^2 / area, less the more points are there, and
-        # costs 1 / voxel of bending.
-        unfolded = _UNFOLDED * self.noise * self.voxel / self.merged**0.5
+        # costs 1 / voxel of bending. Cells wider than the noise leave no room for one.
+        room = min(1.0, self.noise / self.voxel) ** 4
+        unfolded = _UNFOLDED * room * self.noise * self.voxel / self.merged**0.5
         smoothness = max(_THIN_PLATE * self.spacing, unfolded) * self.noise / self.area
         effort = config["effort"]
         return {
