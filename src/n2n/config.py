@@ -108,6 +108,14 @@ class Config:
         _at_least("target_noise", self.target_noise, 0)
         _at_least("average_from", self.average_from, 0)
         _at_least("effort", self.effort, 0)
+        if self.effort == 0:
+            raise ConfigError("effort=0 is out of range; give a number > 0")
+        if self.average_from > 1:
+            raise ConfigError(f"average_from={self.average_from} is out of range; give a share from 0 to 1")
+        if self.effort != 1 and self.iterations != AUTO:
+            raise ConfigError(
+                f"effort={self.effort} (--quality) has no effect on iterations={self.iterations}; leave one of them out"
+            )
         for name, spec in self.terms.items():
             if spec is not None:
                 if not isinstance(spec, dict):

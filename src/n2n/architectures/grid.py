@@ -64,6 +64,7 @@ class Grid(SDF):
         with torch.no_grad():
             self.levels[0] += nodes.norm(dim=-1) - radius * float(size.norm()) / 2
         self._shared: Tensor | None = None
+        self.register_load_state_dict_post_hook(_forget_adaptation)
 
     def coefficients(self) -> Tensor:
         """Return the coefficients of the finest grid, (num_conditions, nx, ny, nz)."""
@@ -176,6 +177,11 @@ class Grid(SDF):
             energy = energy + 2 * (inner * twist.square()).sum()
         # Second differences are h^2 times the derivatives; a cell has volume h^3.
         return energy / self.voxel
+
+
+def _forget_adaptation(grid: Grid, _: object) -> None:
+    """Weigh the energy of a loaded field evenly: the weights follow from the field and are not kept."""
+    grid._rigidity.copy_(grid.band)
 
 
 def _finer(coefficients: Tensor) -> Tensor:

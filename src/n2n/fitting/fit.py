@@ -17,7 +17,7 @@ from n2n.architectures.base import SDF
 from n2n.compose import config_hash
 from n2n.config import AUTO
 from n2n.datamodules.observations import ObservationsDataModule
-from n2n.errors import ConfigError
+from n2n.errors import ConfigError, OutputError
 from n2n.fitting.assemble import build_field, build_objective, build_optimizer
 from n2n.fitting.callbacks import ProgressReport, Report
 from n2n.fitting.checkpoint import AtomicCheckpointIO, read_state
@@ -89,6 +89,11 @@ def fit(
 
     resume = _resume_from(run_dir)
     first = _iteration_of(resume, identity) if resume else 0
+    if run_dir:
+        try:
+            run_dir.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(f"{run_dir}: cannot make this folder ({error.strerror}); choose another one") from error
     data.configure_draws(config["pairs"], config["batch_size"], seed, first, plan_reuse)
     callbacks: list[L.Callback] = [ProgressReport(report)] if report else []
     if run_dir:
@@ -120,8 +125,9 @@ def fit(
     field = module.result.eval().to(device)
     if config["redistance"]:
         boxes = [(shape.chosen.lower, shape.chosen.upper) for shape in shapes]
-        voxel = min(shape.chosen.voxel for shape in shapes)
-        redistance(field, boxes, voxel, config["optimizer"]["lr"], min(iterations, _REDISTANCE_STEPS), seed)
+        voxel = config["architecture"].get("voxel") or min(shape.chosen.voxel for shape in shapes)
+        rate = optimizer([torch.nn.Parameter(torch.zeros(1))]).defaults["lr"]
+        redistance(field, boxes, voxel, rate, min(iterations, _REDISTANCE_STEPS), seed)
     return FitResult(
         field=field,
         frames=data.frames,
@@ -135,7 +141,7 @@ def fit(
             "left_out": data.left_out,
             "outliers": data.outliers,
             "noise": [s.scales.noise * f.scale for s, f in zip(shapes, data.frames, strict=True)],
-            "spacing": [s.chosen.spacing * f.scale for s, f in zip(shapes, data.frames, strict=True)],
+            "spacing": [s.scales.spacing * f.scale for s, f in zip(shapes, data.frames, strict=True)],
             "losses": {name: float(value) for name, value in trainer.callback_metrics.items() if name != "step"},
             "seconds_prepare": round(prepared - start, 2),
             "seconds_fit": round(time.perf_counter() - prepared, 2),

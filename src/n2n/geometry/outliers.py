@@ -114,7 +114,9 @@ def _against_patch(
         mean = patch.mean(axis=1)
         centred = patch - mean[:, None]
         variance, axes = np.linalg.eigh(np.einsum("qki,qkj->qij", centred, centred) / _PATCH)
-        deviation, length = np.sqrt(np.maximum(variance[:, [0, 2]], 1e-300)).T
+        # An exact plane has no deviation but that of rounding, which must not judge.
+        least = np.maximum(1e-8 * variance[:, [2]], 1e-300)
+        deviation, length = np.sqrt(np.maximum(variance[:, [0, 2]], least)).T
         height[chunk] = np.abs(np.einsum("qi,qi->q", queries[chunk] - mean, axes[:, :, 0])) / deviation
         flatness[chunk] = deviation / length
         distance[chunk] = far[:, skip:]

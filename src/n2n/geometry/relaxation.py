@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, diags
+from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import cg
 from scipy.spatial import cKDTree
 
@@ -185,7 +186,10 @@ def _flow(patch: _Patches) -> _Array:
     graph = csr_matrix((weight.ravel(), index.ravel(), np.arange(0, count * near + 1, near)), shape=(count, count))
     graph = (graph + graph.T) / 2
     degree = np.maximum(np.asarray(graph.sum(1)).ravel(), 1e-300)
-    supply = area * _balanced(growth, area)
+    # No flow crosses from one piece of the surface to another: each keeps its points and its own mean.
+    _, piece = connected_components(graph, directed=False)
+    growth -= (np.bincount(piece, area * growth) / np.bincount(piece, area))[piece]
+    supply = area * growth
     potential = cg(diags(degree) - graph, supply, rtol=1e-3, maxiter=100, M=diags(1 / degree))[0]
     # The gradient by least squares over the neighbours; the normal fills the missing rank.
     weight = same / squared

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from n2n.compose import compose
 from n2n.datamodules.observations import ObservationsDataModule
-from n2n.errors import InputError, OutputError
+from n2n.errors import InputError
 from n2n.fitting.callbacks import Report
 from n2n.fitting.fit import fit as fit_data
 from n2n.geometry.checks import check_cloud
@@ -90,11 +90,6 @@ def fit_clouds(
 ) -> Field:
     """Fit one shape's observations, already checked, with a composed configuration."""
     data = ObservationsDataModule([clouds], config["num_observations"])
-    if run_dir:
-        try:
-            Path(run_dir).mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise OutputError(f"{run_dir}: cannot make this folder ({error.strerror}); choose another one") from error
     result = Field.of(fit_data(data, config, Path(run_dir) if run_dir else None, report))
     if run_dir:
         result.save(run_dir)

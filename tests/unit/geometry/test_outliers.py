@@ -88,3 +88,10 @@ def test_of_equal_points_the_first_is_kept():
     points = np.random.default_rng(0).normal(size=(200, 3))
     kept = first_of_equal(np.concatenate([points, points[:30]]))
     assert kept[:200].all() and not kept[200:].any()
+
+
+def test_an_exact_plane_has_no_outliers_however_it_lies():
+    random = np.random.default_rng(0)
+    flat = np.column_stack([random.random(10_000) ** 3, random.random(10_000), np.zeros(10_000)])
+    turn = np.linalg.qr(random.normal(size=(3, 3)))[0]
+    assert not outliers(flat @ turn.T).any()

@@ -173,3 +173,24 @@ def test_hardly_any_points_give_finite_ones(count):
 def test_points_in_one_place_give_finite_ones(count):
     even = spread(np.tile([[0.0, 0.0, 1.0]], (count, 1)), sphere)
     assert np.isfinite(even).all() and np.allclose(np.linalg.norm(even, axis=1), 1)
+
+
+@pytest.mark.parametrize("counts", [(1500, 1500), (1000, 1400)])
+def test_two_pieces_are_spread_each_by_itself(counts):
+    # A flow that balanced one against the other would have no solution: nothing leads across.
+    random = np.random.default_rng(3)
+    centres = np.repeat([[0.0, 0, 0], [5.0, 0, 0]], counts, axis=0)
+    points = random.normal(size=(sum(counts), 3))
+    points = centres + points / np.linalg.norm(points, axis=1, keepdims=True)
+
+    def project(x):
+        centre = np.where(x[:, :1] < 2.5, 0.0, 5.0) * [[1, 0, 0]]
+        normals = (x - centre) / np.linalg.norm(x - centre, axis=1, keepdims=True)
+        return centre + normals, normals
+
+    result = spread(points, project)
+    assert np.median(np.linalg.norm(result - points, axis=1)) < np.sqrt(4 * np.pi / min(counts))
+    for which, count in zip((result[:, 0] < 2.5, result[:, 0] > 2.5), counts, strict=True):
+        assert which.sum() == count
+        gap = cKDTree(result[which]).query(result[which], 2)[0][:, 1] / np.sqrt(2 / np.sqrt(3) * 4 * np.pi / count)
+        assert np.quantile(gap, 0.05) > 0.65
