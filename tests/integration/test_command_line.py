@@ -661,7 +661,7 @@ def test_doctor_names_versions_and_what_is_missing(n2n, monkeypatch):
     monkeypatch.setattr(doctor, "_version", lambda package: known[package] if package in known else found(package))
     code, out, _ = n2n("doctor")
     assert code == 1
-    assert "scipy              MISSING: pip install 'scipy>=1.11'" in out
+    assert "scipy              MISSING: pip install 'scipy>=1.12'" in out
     assert "laspy              MISSING: pip install 'laspy[lazrs]>=2.5'" in out
     assert "rich               12.0.0 DOES NOT FIT: pip install 'rich>=13'" in out
     assert "not ready: laspy, rich, scipy missing or broken" in out
