@@ -112,7 +112,7 @@ def _add_task(commands: argparse._SubParsersAction, task: str, summary: str, exa
     if task != "reconstruct":
         command.add_argument("--even", action="store_true", help="also spread the points evenly along the surface")
         command.add_argument(
-            "--remove-outliers", action="store_true", help="leave out points that look like outliers (they are kept)"
+            "--remove-outliers", action="store_true", help="drop points that look like outliers; else they stay"
         )
     command.add_argument(
         "--quality", default="normal", choices=list(QUALITIES), help="less or more of the machine's time (normal)"
