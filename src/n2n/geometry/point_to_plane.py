@@ -2,9 +2,10 @@
 
 import torch
 from jaxtyping import Float
+from scipy.spatial import cKDTree
 from torch import Tensor
 
-from n2n.shapes import Points, Values
+from n2n.shapes import Index, Points, Values
 
 _CHUNK = 4096
 
@@ -26,11 +27,16 @@ def point_to_plane(
     Returns:
         (n,) distances, unit coordinates, >= 0.
     """
-    distance = torch.empty(len(points), device=points.device)
-    for start in range(0, len(points), _CHUNK):
-        part = slice(start, start + _CHUNK)
-        reach, index = torch.cdist(points[part], samples).min(dim=1)
-        along = ((points[part] - samples[index]) * normals[index]).sum(-1)
-        aside = (reach.square() - along.square()).clamp(0, spacing**2)
-        distance[part] = (reach.square() - aside).sqrt()
-    return distance
+    index = _nearest(points, samples)
+    offset = points - samples[index]
+    reach = offset.square().sum(-1)
+    along = (offset * normals[index]).sum(-1)
+    aside = (reach - along.square()).clamp(0, spacing**2)
+    return (reach - aside).clamp(min=0).sqrt()
+
+
+def _nearest(points: Points, samples: Float[Tensor, "m 3"]) -> Index:
+    """Return the nearest sample of each point, (n,): by a tree on the CPU, by all distances on a GPU."""
+    if points.device.type == "cpu":
+        return torch.as_tensor(cKDTree(samples.numpy()).query(points.numpy(), workers=-1)[1], dtype=torch.long)
+    return torch.cat([torch.cdist(part, samples).argmin(dim=1) for part in points.split(_CHUNK)])
