@@ -191,15 +191,52 @@ DATAMODULES = Registry(
     "n2n.datamodules",
     {
         "files": Builtin("n2n.datamodules.files:FilesDataModule", "your own files: observations of one or more shapes"),
+        "abc": Builtin("n2n.datamodules.points2surf:ABCDataModule", "ABC of Points2Surf: simulated range scans"),
+        "dfaust": Builtin("n2n.datamodules.dfaust:DFaustDataModule", "D-FAUST human scans, the selection of SAP"),
+        "famous": Builtin("n2n.datamodules.points2surf:FamousDataModule", "FAMOUS of Points2Surf: simulated scans"),
         "generated": Builtin("n2n.datamodules.generated:GeneratedDataModule", "noisy scans of analytic shapes"),
+        "kitti": Builtin("n2n.datamodules.kitti:KittiDataModule", "KITTI: frames of a rotating laser scanner"),
+        "paris": Builtin("n2n.datamodules.paris:ParisDataModule", "Paris-rue-Madame: a street in chunks"),
+        "pc": Builtin("n2n.datamodules.pointcleannet:PCDataModule", "the PointCleanNet test shapes, noise added"),
+        "pu": Builtin("n2n.datamodules.punet:PUDataModule", "the PU-Net test shapes, Poisson-disk clouds, noise added"),
+        "scene3d": Builtin("n2n.datamodules.scene3d:Scene3DDataModule", "3D Scene: indoor scans of Zhou and Koltun"),
+        "shapenet": Builtin("n2n.datamodules.shapenet:ShapeNetDataModule", "ShapeNet in the layout of Occupancy Networks"),
+        "srb": Builtin("n2n.datamodules.srb:SRBDataModule", "Surface Reconstruction Benchmark: simulated range scans"),
     },
 )
 METRICS = Registry(
     "metric",
     "n2n.metrics",
     {
-        "l1cd": Builtin("n2n.metrics.chamfer:L1Chamfer", "mean of both directions' mean distances"),
-        "l2cd": Builtin("n2n.metrics.chamfer:L2Chamfer", "mean of both directions' mean squared distances"),
+        "emd": Builtin("n2n.metrics.modules:EMD", "mean distance of an optimal one-to-one matching"),
+        "fscore": Builtin("n2n.metrics.modules:FScore", "harmonic mean of precision and recall within a distance"),
+        "hausdorff": Builtin("n2n.metrics.modules:Hausdorff", "largest distance to the nearest point, both directions"),
+        "l1cd": Builtin("n2n.metrics.modules:L1Chamfer", "mean of both directions' mean distances"),
+        "l2cd": Builtin("n2n.metrics.modules:L2Chamfer", "mean of both directions' mean squared distances"),
+        "nc": Builtin("n2n.metrics.modules:NormalConsistency", "agreement of normals at nearest points"),
+        "p2m": Builtin("n2n.metrics.modules:PointToMesh", "mean squared distances points to mesh plus faces to points"),
+        "sdf_error": Builtin("n2n.metrics.modules:SDFError", "error of a signed distance: size and sign"),
     },
 )
-ALL = [ARCHITECTURES, DISTANCES, PAIRINGS, REGULARISERS, DATAMODULES, METRICS]
+PROTOCOLS = Registry(
+    "protocol",
+    "n2n.protocols",
+    {
+        "neuralpull": Builtin("n2n.evaluation.protocol:Protocol", "ABC, FAMOUS: NeuralPull's halved squared distances"),
+        "onet": Builtin("n2n.evaluation.protocol:Protocol", "ShapeNet: 100,000 samples in the unit cube, as ConvONet"),
+        "p2s": Builtin("n2n.evaluation.protocol:Protocol", "ABC, FAMOUS: Points2Surf's sum of distances, even samples"),
+        "sap": Builtin("n2n.evaluation.protocol:Protocol", "D-FAUST, SRB: 50,000 samples, as Shape As Points"),
+        "sbp": Builtin("n2n.evaluation.protocol:Protocol", "PU, PC: denoised or upsampled points, as score-denoise"),
+        "scene3d": Builtin("n2n.evaluation.protocol:Protocol", "3D Scene: 1,000,000 samples in metres, as CAP-UDF"),
+    },
+)
+BASELINES = Registry(
+    "baseline",
+    "n2n.baselines",
+    {
+        "bilateral": Builtin("n2n.baselines.cgal:Bilateral", "bilateral smoothing of CGAL (pip install n2n[cgal])"),
+        "jet": Builtin("n2n.baselines.cgal:Jet", "jet smoothing of CGAL (pip install n2n[cgal])"),
+        "poisson": Builtin("n2n.baselines.poisson:ScreenedPoisson", "screened Poisson (pip install n2n[poisson])"),
+    },
+)
+ALL = [ARCHITECTURES, DISTANCES, PAIRINGS, REGULARISERS, DATAMODULES, METRICS, PROTOCOLS, BASELINES]

@@ -45,6 +45,8 @@ def _dispatch(options: argparse.Namespace) -> int:
         from n2n.cli.fit import run_fit
 
         return run_fit(options.overrides)
+    if hasattr(options, "run_command"):
+        return options.run_command(options)
     if options.command == "list":
         from n2n.cli.listing import run_list
 

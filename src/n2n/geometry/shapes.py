@@ -5,6 +5,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from n2n.geometry.noise import add_noise
+
 _Distance = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 
@@ -72,18 +74,25 @@ def sample_surface(shape: str, count: int, seed: int = 0) -> NDArray[np.float64]
     return points
 
 
-def scan(shape: str, count: int, noise: float, seed: int = 0) -> NDArray[np.float64]:
-    """Return a simulated scan: even surface points plus isotropic Gaussian noise.
+def surface_normals(shape: str, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return outward unit normals at points on or near the surface, (n, 3)."""
+    distance, lower, upper = SHAPES[shape]
+    return _gradient(distance, points, 0.004 * float(np.linalg.norm(np.subtract(upper, lower))))
+
+
+def scan(shape: str, count: int, noise: float, seed: int = 0, model: str = "gaussian") -> NDArray[np.float64]:
+    """Return a simulated scan: even surface points plus noise, row by row those of `sample_surface`.
 
     Args:
         shape: A name of `SHAPES`.
         count: Points.
         noise: Standard deviation relative to the bounding radius.
         seed: Of points and noise.
+        model: A name of `NOISE_MODELS`.
     """
     points = sample_surface(shape, count, seed)
-    radius = np.linalg.norm(points - (points.min(axis=0) + points.max(axis=0)) / 2, axis=1).max()
-    return points + noise * radius * np.random.default_rng([seed, 1]).standard_normal(points.shape)
+    radius = float(np.linalg.norm(points - (points.min(axis=0) + points.max(axis=0)) / 2, axis=1).max())
+    return add_noise(points, model, noise * radius, np.random.default_rng([seed, 1]), surface_normals(shape, points))
 
 
 def _gradient(distance: _Distance, points: NDArray[np.float64], shell: float) -> NDArray[np.float64]:

@@ -1,17 +1,19 @@
-"""Chamfer distances between point sets: functions first, the registered classes are thin."""
+"""Chamfer distances between point sets."""
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from n2n.errors import ConfigError
+from n2n.metrics.nearest import nearest
 
-_COMBINE = {"mean": 0.5, "sum": 1.0}
+COMBINE = {"mean": 0.5, "sum": 1.0}
 
 
-def nearest_distances(points: NDArray[np.float64], cloud: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the distance of each of (n, 3) points to the nearest of (m, 3) cloud points, (n,), same unit."""
-    return cKDTree(cloud).query(points)[0]
+def directions(
+    prediction: NDArray[np.float64], truth: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the distances (n,) prediction to truth and (m,) truth to prediction, for several metrics at once."""
+    return nearest(prediction, truth)[0], nearest(truth, prediction)[0]
 
 
 def chamfer(prediction: NDArray[np.float64], truth: NDArray[np.float64], p: int, combine: str = "mean") -> float:
@@ -25,33 +27,24 @@ def chamfer(prediction: NDArray[np.float64], truth: NDArray[np.float64], p: int,
     Returns:
         unit^p, raw: no factor of 10^4.
 
+    Raises:
+        ConfigError: Another p or combination.
+
     >>> chamfer(np.zeros((1, 3)), np.array([[3.0, 0, 4.0]]), p=1)
     5.0
     """
-    forth = (nearest_distances(prediction, truth) ** p).mean()
-    back = (nearest_distances(truth, prediction) ** p).mean()
-    return float(_COMBINE[combine] * (forth + back))
+    return chamfer_of(*directions(prediction, truth), p, combine)
 
 
-class _Chamfer:
-    p: int
-
-    def __init__(self, combine: str = "mean") -> None:
-        if combine not in _COMBINE:
-            raise ConfigError(f"combine={combine} is not known; choose one of: {', '.join(_COMBINE)}")
-        self.combine = combine
-
-    def __call__(self, prediction: NDArray[np.float64], truth: NDArray[np.float64]) -> float:
-        return chamfer(prediction, truth, self.p, self.combine)
+def chamfer_of(forth: NDArray[np.float64], back: NDArray[np.float64], p: int, combine: str = "mean") -> float:
+    """Return the Chamfer distance from the distances of both `directions`."""
+    check_chamfer(p, combine)
+    return float(COMBINE[combine] * ((forth**p).mean() + (back**p).mean()))
 
 
-class L1Chamfer(_Chamfer):
-    """Both directions' mean distances, combined; see `chamfer`."""
-
-    p = 1
-
-
-class L2Chamfer(_Chamfer):
-    """Both directions' mean squared distances, combined; see `chamfer`."""
-
-    p = 2
+def check_chamfer(p: int, combine: str) -> None:
+    """Raise ConfigError unless exponent and combination are known."""
+    if p not in (1, 2):
+        raise ConfigError(f"p={p} is not known; choose 1 (distances) or 2 (squared distances)")
+    if combine not in COMBINE:
+        raise ConfigError(f"combine={combine} is not known; choose one of: {', '.join(COMBINE)}")

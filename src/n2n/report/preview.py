@@ -42,7 +42,7 @@ def draw_preview(
     """
     vertices = np.asarray(mesh.vertices) if mesh is not None else None
     everything = next(x for x in (after, vertices, before) if x is not None)
-    camera = Camera.around(everything, up=_up_axis(everything))
+    camera = Camera.around(everything, up=up_axis(everything))
     labels = captions or (
         f"noisy: {0 if before is None else len(before):,} points",
         f"denoised: {0 if after is None else len(after):,} points",
@@ -59,7 +59,7 @@ def draw_preview(
     _save(path, [(render([layer], camera, size), label) for layer, label in panels])
 
 
-def _up_axis(points: NDArray[np.float64]) -> int:
+def up_axis(points: NDArray[np.float64]) -> int:
     """Scans stand on z more often than not; flat ones lie on their thinnest axis."""
     extent = np.ptp(points, axis=0)
     thinnest = int(extent.argmin())

@@ -1,0 +1,151 @@
+"""One fit measured: data in, numbers out. Runs in a process of its own."""
+
+import dataclasses
+import datetime
+import os
+import platform
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import n2n
+from n2n.compose import compose, config_hash
+from n2n.datamodules.benchmark import BenchmarkDataModule
+from n2n.errors import ConfigError, N2NError
+from n2n.evaluation.protocol import Protocol, load_protocol
+from n2n.fitting.fit import fit as fit_data
+from n2n.registry import BASELINES, DATAMODULES
+from n2n.tables.memory import peak, reset_peak
+from n2n.tables.spec import Fit
+from n2n.tables.store import protocol_hash, sources
+from n2n.tasks.field import Field
+
+
+def measure(fit: Fit, evaluations: set[str], samples: int | None = None) -> dict[str, Any]:
+    """Run a fit and its evaluations.
+
+    Args:
+        fit: What to run.
+        evaluations: `task/protocol`, e.g. `{"denoise/sbp"}`.
+        samples: At most this many samples a side, whatever a protocol says.
+
+    Returns:
+        Plain data: settings, where and when, cost, results. A failure is a record, too: status `failed` and the error.
+    """
+    start = time.perf_counter()
+    record: dict[str, Any] = {
+        "id": fit.id,
+        "method": fit.method,
+        "datamodule": fit.datamodule,
+        "shape": fit.shape,
+        "settings": list(fit.settings),
+        "made": _made(),
+    }
+    try:
+        record |= _run(fit, evaluations, samples)
+        record["status"] = "done"
+    except N2NError as error:
+        record |= {"status": "failed", "error": str(error)}
+    except Exception as error:  # one bad shape never loses the others' results
+        record |= {"status": "failed", "error": f"{type(error).__name__}: {error}"}
+    record["cost"] = {**record.get("cost", {}), "seconds": round(time.perf_counter() - start, 2)}
+    return record
+
+
+def _run(fit: Fit, evaluations: set[str], samples: int | None) -> dict[str, Any]:
+    config = compose([f"datamodule={fit.datamodule}", f"datamodule.shape={fit.shape}", *fit.settings])
+    data = DATAMODULES.build(config["datamodule"], num_observations=config["num_observations"])
+    if not isinstance(data, BenchmarkDataModule):
+        raise ConfigError(f"datamodule {fit.datamodule!r} knows no true surface; tables need a benchmark datamodule")
+    noisy, made = data.noisy, {"source": data.source}
+    made["config"] = config_hash({**config, "device": None, "data": data.fingerprint()})
+    truth = data.reference
+    if truth.points is None and truth.vertices is None and evaluations - {""}:
+        blank = {"values": {}, "floors": {}, "blanks": {}, "blank": f"no ground truth of {fit.shape} is present"}
+        return {**made, "results": {e: {"definition": protocol_hash(e.split("/")[1]), **blank} for e in evaluations}}
+    reset_peak()
+    start = time.perf_counter()
+    if fit.method == "n2n":
+        result = fit_data(data, config)
+        method: Any = Field.of(result)
+        about = {key: method.report[key] for key in ("iterations", "points", "observations", "noise", "outliers")}
+    else:
+        method, about = BASELINES.build(fit.method), {}
+    seconds = time.perf_counter() - start
+    results = {}
+    for evaluation in sorted(evaluations - {""}):
+        task, protocol = evaluation.split("/")
+        prediction, seconds_task = _predict(method, task, noisy)
+        scored = _protocol(protocol, samples).evaluate(prediction, truth, noisy)
+        results[evaluation] = {
+            "definition": protocol_hash(protocol),
+            "values": _short(scored.values),
+            "floors": {name: _short(values) for name, values in scored.floors.items()},
+            "blanks": {**scored.blanks, **scored.floor_blanks},
+            "seconds": round(seconds_task, 2),
+        }
+    return {
+        **made,
+        "fit": about,
+        "cost": {"minutes": seconds / 60, "memory": peak() / 2**30},
+        "results": results,
+    }
+
+
+def _protocol(name: str, samples: int | None) -> Protocol:
+    protocol = load_protocol(name)
+    if samples is None:
+        return protocol
+    sides = {side: dict(getattr(protocol, side)) for side in ("reference", "prediction")}
+    for side in sides.values():
+        if side["samples"] is not None:
+            side["samples"] = min(side["samples"], samples)
+    return dataclasses.replace(protocol, **sides)
+
+
+def _predict(method: Any, task: str, noisy: np.ndarray) -> tuple[Any, float]:
+    """Return what a method makes of the noisy points, and the seconds it took."""
+    if not hasattr(method, task):
+        raise ConfigError(f"{type(method).__name__} cannot {task}")
+    start = time.perf_counter()
+    if isinstance(method, Field):
+        prediction = method.reconstruct() if task == "reconstruct" else getattr(method, task)(noisy)
+    else:
+        prediction = getattr(method, task)(noisy)
+    return prediction, time.perf_counter() - start
+
+
+def _short(values: dict[str, Any]) -> dict[str, Any]:
+    """Round to six digits: what is below is not reproducible between machines."""
+    return {key: float(f"{value:.6g}") if isinstance(value, float) else value for key, value in values.items()}
+
+
+def _made() -> dict[str, Any]:
+    """Return with which sources, when and where."""
+    import torch
+
+    gpu = torch.cuda.get_device_name() if torch.cuda.is_available() else None
+    return {
+        "n2n": n2n.__version__,
+        "commit": os.environ.get("N2N_COMMIT") or commit(),
+        "sources": sources(),
+        "torch": torch.__version__,
+        "machine": f"{platform.machine()}, {os.cpu_count()} cores" + (f", {gpu}" if gpu else ""),
+        "date": datetime.datetime.now().astimezone().isoformat(timespec="seconds"),
+    }
+
+
+def commit() -> str:
+    """Return the commit of a checkout, `+` where it has changes; `unknown` elsewhere."""
+    here = Path(__file__).parent
+    try:
+        name, changes = (
+            subprocess.run(["git", "-C", here, *command], capture_output=True, text=True, check=True).stdout.strip()
+            for command in (["rev-parse", "--short", "HEAD"], ["status", "--porcelain", "--", str(here.parent)])
+        )
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+    return f"{name}+" if changes else name

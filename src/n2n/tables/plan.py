@@ -1,0 +1,128 @@
+"""What a profile has to measure: every fit once, however many tables want it."""
+
+import functools
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from n2n.errors import N2NError
+from n2n.registry import DATAMODULES
+from n2n.tables.spec import Fit, Profile, Table, Wanted, expand, load_tables
+from n2n.tables.store import Store, lacking, protocol_hash, sources
+
+
+@dataclass
+class Job:
+    """A fit with everything that any table wants to know about it.
+
+    Attributes:
+        fit: What to run.
+        evaluations: `task/protocol`; an empty text where only the cost counts.
+        tables: Who wants it.
+    """
+
+    fit: Fit
+    evaluations: set[str] = field(default_factory=set)
+    tables: set[str] = field(default_factory=set)
+
+
+@dataclass
+class Plan:
+    """The cells of the tables asked for, and the fits behind them.
+
+    Attributes:
+        profile: With which effort.
+        tables: Asked for.
+        wanted: Per table name its cells.
+        jobs: By fit, in the order of the tables.
+    """
+
+    profile: Profile
+    tables: list[Table]
+    wanted: dict[str, list[Wanted]]
+    jobs: dict[Fit, Job]
+
+    def open(self, store: Store) -> list[Job]:
+        """Return the jobs that are not done, with only the evaluations that are lacking."""
+        return [job for job in self.jobs.values() if not self.is_done(job, store)]
+
+    def is_done(self, job: Job, store: Store) -> bool:
+        """Tell whether the store holds all of a job by the present definitions."""
+        record = store.read(job.fit)
+        return record is not None and record["status"] == "done" and not lacking(record, job.evaluations, self.protocols)
+
+    def stale(self, store: Store) -> list[Job]:
+        """Return the jobs that are done, but by other sources than these."""
+        now = sources()
+        return [j for j in self.jobs.values() if self.is_done(j, store) and store.read(j.fit)["made"]["sources"] != now]
+
+    @functools.cached_property
+    def protocols(self) -> dict[str, str]:
+        """Content hash of every protocol in use."""
+        names = {e.split("/")[1] for job in self.jobs.values() for e in job.evaluations if e}
+        return {name: protocol_hash(name) for name in names}
+
+
+def make_plan(names: Sequence[str], profile: Profile, root: str | None = None) -> Plan:
+    """Return what the tables asked for need.
+
+    A fit is wanted once with the evaluations of *all* tables, so that asking for another table later fits nothing again.
+    """
+    chosen, everything = load_tables(list(names)), load_tables()
+    present = functools.cache(functools.partial(shapes_present, root=root))
+    cells = {table.name: expand(table, profile, present) for table in everything}
+    jobs: dict[Fit, Job] = {}
+    for name, wanted in cells.items():
+        for cell in wanted:
+            for fit in cell.fits:
+                job = jobs.setdefault(fit, Job(fit))
+                job.evaluations.add(cell.evaluation)
+                job.tables.add(name)
+    asked = {table.name for table in chosen}
+    ordered = {
+        fit: jobs[fit] for table in chosen for cell in cells[table.name] for fit in cell.fits if jobs[fit].tables & asked
+    }
+    return Plan(profile, chosen, {name: cells[name] for name in asked}, ordered)
+
+
+def shapes_present(datamodule: str, root: str | None = None) -> tuple[list[str], str | None]:
+    """Return the shapes of a dataset that are at hand, and what is missing and where to get it."""
+    component: Any = DATAMODULES.get(datamodule)
+    try:
+        return component.names(root), component.missing(root)
+    except N2NError as error:
+        return [], str(error)
+
+
+def estimate(job: Job, gpu: bool = False) -> float:
+    """Return the seconds a job takes, from the measured costs in `_COSTS`."""
+    settings = dict(text.split("=", 1) for text in job.fit.settings)
+    if job.fit.method != "n2n":
+        return 10.0
+    costs = _COSTS["gpu" if gpu else "cpu"]
+    points = float(settings.get("datamodule.points", 10_000))
+    observations = float(settings.get("num_observations", 1))
+    tasks = 1.0 * len(job.evaluations)
+    if settings.get("recipe", "fast") == "paper":
+        return float(settings.get("iterations", 800_000)) * costs["paper_step"] * _load(settings) + tasks
+    seen = min(points * observations, 16 * 32_768)
+    return costs["start"] + costs["per_point"] * seen + tasks
+
+
+def _load(settings: dict[str, str]) -> float:
+    """Return how much dearer a step of the paper's recipe is than one with B = 250: the matching is cubic in B."""
+    batch = float(settings.get("batch_size", 5000 if settings.get("task") == "reconstruct" else 250)) / 250
+    return max(1.0, 0.5 * batch + 0.002 * batch**2.5)
+
+
+# Seconds, measured on 2 cores without a GPU and on one H100 (docs/results.md names commands and machines).
+_COSTS: dict[str, dict[str, float]] = {
+    "cpu": {"start": 9.0, "per_point": 1.5e-4, "paper_step": 0.05},
+    "gpu": {"start": 3.5, "per_point": 3e-5, "paper_step": 0.006},
+}
+
+
+def cores() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

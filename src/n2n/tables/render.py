@@ -1,0 +1,135 @@
+"""A filled table as Markdown, LaTeX and CSV."""
+
+import csv
+import io
+from dataclasses import dataclass
+
+from n2n.tables.grid import FLOOR, OURS, Cell, Grid
+
+_DIGITS = 3
+
+
+@dataclass
+class Rendered:
+    """One table in three notations, with the number of its blanks."""
+
+    markdown: str
+    latex: str
+    csv: str
+    ours: int
+    blank: int
+
+
+def render(title: str, about: list[str], grid: Grid) -> Rendered:
+    """Write a table.
+
+    Args:
+        title: Heading.
+        about: Lines under it: profile, data, unit.
+        grid: The cells; ours may stand in rows or columns of their own.
+    """
+    notes = _Notes()
+    rows = [[row, *(_text(grid.cells.get((row, column)), notes) for column in grid.columns)] for row in grid.rows]
+    mine = [cell for cell in grid.cells.values() if cell.origin == OURS]
+    return Rendered(
+        markdown=_markdown(title, about, grid.columns, rows, notes.lines),
+        latex=_latex(title, grid, notes.lines),
+        csv=_csv(grid),
+        ours=sum(cell.value is not None for cell in mine),
+        blank=sum(cell.value is None for cell in mine),
+    )
+
+
+class _Notes:
+    """Footnotes, each text once, numbered as they come."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def mark(self, texts: list[str]) -> str:
+        for text in texts:
+            if text not in self.lines:
+                self.lines.append(text)
+        return ",".join(str(self.lines.index(text) + 1) for text in texts)
+
+
+def number(value: float) -> str:
+    """Write a number with three decimals, or with three significant digits where it is small or large.
+
+    >>> number(4.2211), number(0.00123), number(1234.5)
+    ('4.221', '0.00123', '1234')
+    """
+    if value and not 0.01 <= abs(value) < 1000:
+        return f"{value:.{_DIGITS}g}" if abs(value) < 1 else f"{value:.0f}"
+    return f"{value:.{_DIGITS}f}"
+
+
+def _text(cell: Cell | None, notes: _Notes) -> str:
+    if cell is None:
+        return ""
+    marks = notes.mark([*cell.notes, *([cell.reason] if cell.value is None and cell.origin != "paper" else [])])
+    raised = f"<sup>{marks}</sup>" if marks else ""
+    if cell.value is None:
+        return f"-{raised}"
+    text = number(cell.value)
+    return f"{f'**{text}**' if cell.bold else text}{raised}"
+
+
+def _markdown(title: str, about: list[str], columns: list[str], rows: list[list[str]], notes: list[str]) -> str:
+    lines = [f"# {title}", "", *(f"{line}  " for line in about), ""]
+    lines += ["| |" + "|".join(f" {c} " for c in columns) + "|", "|---|" + "---:|" * len(columns)]
+    lines += ["| " + " | ".join(row) + " |" for row in rows]
+    lines += ["", *(f"{index}. {text}" for index, text in enumerate(notes, 1))]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _latex(title: str, grid: Grid, notes: list[str]) -> str:
+    marks = _Notes()
+    marks.lines = list(notes)
+    lines = [
+        "% needs booktabs",
+        r"\begin{table}",
+        rf"\caption{{{_escape(title)}}}",
+        rf"\begin{{tabular}}{{l{'r' * len(grid.columns)}}}",
+        r"\toprule",
+        " & ".join(["", *map(_escape, grid.columns)]) + r" \\",
+        r"\midrule",
+    ]
+    for row in grid.rows:
+        cells = []
+        for column in grid.columns:
+            cell = grid.cells.get((row, column))
+            if cell is None:
+                cells.append("")
+                continue
+            text = "--" if cell.value is None else number(cell.value)
+            text = rf"\textbf{{{text}}}" if cell.bold else text
+            reason = [cell.reason] if cell.value is None and cell.origin != "paper" else []
+            raised = marks.mark([*cell.notes, *reason])
+            cells.append(text + (rf"$^{{{raised}}}$" if raised else ""))
+        lines.append(" & ".join([_escape(row), *cells]) + r" \\")
+    lines += [r"\bottomrule", r"\end{tabular}"]
+    lines += [rf"\par\footnotesize $^{{{i}}}$ {_escape(text)}" for i, text in enumerate(notes, 1)]
+    return "\n".join([*lines, r"\end{table}", ""])
+
+
+def _escape(text: str) -> str:
+    for plain, tex in (("\\", r"\textbackslash{}"), ("&", r"\&"), ("%", r"\%"), ("_", r"\_"), ("#", r"\#")):
+        text = text.replace(plain, tex)
+    return text.replace("^", r"\^{}").replace("~", r"\~{}")
+
+
+def _csv(grid: Grid) -> str:
+    """One line per cell: what a program reads."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(["row", "column", "value", "origin", "shapes", "best", "remark"])
+    for row in grid.rows:
+        for column in grid.columns:
+            cell = grid.cells.get((row, column))
+            if cell is not None:
+                value = "" if cell.value is None else f"{cell.value:.6g}"
+                remark = "; ".join([*([cell.reason] if cell.value is None else []), *cell.notes])
+                shapes = cell.shapes if cell.origin in (OURS, FLOOR) and cell.shapes else ""
+                writer.writerow([row, column, value, cell.origin, shapes, int(cell.bold), remark])
+    return out.getvalue()

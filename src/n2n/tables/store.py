@@ -1,0 +1,99 @@
+"""What has been measured: one small JSON file per fit."""
+
+import functools
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+from n2n.compose import conf_dir, config_hash
+from n2n.errors import InputError, OutputError
+from n2n.evaluation.options import load_option
+from n2n.formats import atomic_path
+from n2n.tables.spec import Fit
+
+# What decides a number. Tables, pictures and commands do not: their changes leave results valid.
+_DECIDING = (
+    "architectures", "baselines", "datamodules", "evaluation", "fitting", "geometry", "losses", "metrics", "tasks",
+    "transport", "config.py",
+)  # fmt: skip
+_NOT_DECIDING = {"table", "profile", "protocol", "logger", "experiment", "debug"}
+
+
+class Store:
+    """Results under a folder: `<datamodule>/<shape>-<id>.json`.
+
+    Args:
+        folder: Made when the first result is kept.
+    """
+
+    def __init__(self, folder: str | Path) -> None:
+        self.folder = Path(folder)
+
+    def path(self, fit: Fit) -> Path:
+        """Return where the result of a fit is kept."""
+        return self.folder / fit.datamodule / f"{fit.shape.replace('/', '_')}-{fit.id}.json"
+
+    def read(self, fit: Fit) -> dict[str, Any] | None:
+        """Return the result of a fit; None if there is none.
+
+        Raises:
+            InputError: The file is damaged.
+        """
+        path = self.path(fit)
+        try:
+            return json.loads(path.read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            return None
+        except (OSError, ValueError) as error:
+            raise InputError(f"{path}: cannot be read ({error}); delete it, it will be measured again") from error
+
+    def write(self, fit: Fit, record: dict[str, Any]) -> None:
+        """Keep a result, whole or not at all.
+
+        Raises:
+            OutputError: The folder cannot be written.
+        """
+        path = self.path(fit)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(f"{path.parent}: cannot make this folder ({error.strerror})") from error
+        with atomic_path(path) as temporary:
+            temporary.write_text(json.dumps(record, indent=1, default=float) + "\n", encoding="utf-8")
+
+
+def lacking(record: dict[str, Any] | None, evaluations: set[str], protocols: dict[str, str]) -> set[str]:
+    """Return the evaluations a record does not hold, or holds by another definition of the protocol.
+
+    Args:
+        record: As stored, or None.
+        evaluations: `task/protocol`; empty text: only that the fit ended.
+        protocols: Content hash of each protocol's definition.
+    """
+    if record is None or record["status"] != "done":
+        return set(evaluations)
+    kept = record["results"]
+    return {e for e in evaluations if e and (e not in kept or kept[e]["definition"] != protocols[e.split("/")[1]])}
+
+
+@functools.cache
+def protocol_hash(name: str) -> str:
+    """Return 10 hex digits of a protocol's definition."""
+    return config_hash(load_option("protocol", name))
+
+
+@functools.cache
+def sources() -> str:
+    """Return 10 hex digits of all source files that decide a number: results of others may differ."""
+    package, conf = Path(__file__).parent.parent, conf_dir()
+    files = [path for name in _DECIDING for path in sorted(_python(package / name))]
+    files += [path for path in sorted(conf.rglob("*.yaml")) if path.relative_to(conf).parts[0] not in _NOT_DECIDING]
+    digest = hashlib.sha256()
+    for path in files:
+        digest.update(path.name.encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()[:10]
+
+
+def _python(path: Path) -> list[Path]:
+    return [path] if path.is_file() else list(path.rglob("*.py"))
