@@ -123,4 +123,6 @@ def _write(plan, store, out) -> None:
 
     made = write_tables(plan, store, out)
     ours, blank = (sum(getattr(table, name) for table in made.values()) for name in ("ours", "blank"))
-    say(f"tables: {len(made)} rendered, {ours} cells of ours, {blank} blank, each with its reason -> {out / 'index.md'}")
+    say(
+        f"tables: {len(made)} rendered, {ours} cells of ours, {blank} blank, each with its reason -> {out / 'index.md'}"
+    )

@@ -58,8 +58,8 @@ def _value(wanted: Wanted, fit: Fit, store: Store, protocols: dict[str, str]) ->
         return None, "not measured yet"
     if record["status"] != "done":
         return None, f"failed: {record['error']}"
-    if lacking(record, {wanted.evaluation}, protocols):
-        return None, "measured by an older definition of the protocol"
+    if lacking(record, {wanted.evaluation: {wanted.floor} - {""}}, protocols):
+        return None, "not measured yet by the present definition of the protocol"
     group, _, key = wanted.value.rpartition(".")
     if group == "cost":
         return record["cost"][key], ""

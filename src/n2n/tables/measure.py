@@ -6,6 +6,7 @@ import os
 import platform
 import subprocess
 import time
+from collections.abc import Mapping, Set
 from pathlib import Path
 from typing import Any
 
@@ -24,12 +25,12 @@ from n2n.tables.store import protocol_hash, sources
 from n2n.tasks.field import Field
 
 
-def measure(fit: Fit, evaluations: set[str], samples: int | None = None) -> dict[str, Any]:
+def measure(fit: Fit, evaluations: Mapping[str, Set[str]], samples: int | None = None) -> dict[str, Any]:
     """Run a fit and its evaluations.
 
     Args:
         fit: What to run.
-        evaluations: `task/protocol`, e.g. `{"denoise/sbp"}`.
+        evaluations: `task/protocol` and the floors wanted with it, e.g. `{"denoise/sbp": {"oracle"}}`.
         samples: At most this many samples a side, whatever a protocol says.
 
     Returns:
@@ -55,7 +56,7 @@ def measure(fit: Fit, evaluations: set[str], samples: int | None = None) -> dict
     return record
 
 
-def _run(fit: Fit, evaluations: set[str], samples: int | None) -> dict[str, Any]:
+def _run(fit: Fit, evaluations: Mapping[str, Set[str]], samples: int | None) -> dict[str, Any]:
     config = compose([f"datamodule={fit.datamodule}", f"datamodule.shape={fit.shape}", *fit.settings])
     data = DATAMODULES.build(config["datamodule"], num_observations=config["num_observations"])
     if not isinstance(data, BenchmarkDataModule):
@@ -63,9 +64,9 @@ def _run(fit: Fit, evaluations: set[str], samples: int | None) -> dict[str, Any]
     noisy, made = data.noisy, {"source": data.source}
     made["config"] = config_hash({**config, "device": None, "data": data.fingerprint()})
     truth = data.reference
-    if truth.points is None and truth.vertices is None and evaluations - {""}:
+    if truth.points is None and truth.vertices is None and any(evaluations):
         blank = {"values": {}, "floors": {}, "blanks": {}, "blank": f"no ground truth of {fit.shape} is present"}
-        return {**made, "results": {e: {"definition": protocol_hash(e.split("/")[1]), **blank} for e in evaluations}}
+        return {**made, "results": {e: {**_asked(e, floors), **blank} for e, floors in evaluations.items() if e}}
     reset_peak()
     start = time.perf_counter()
     if fit.method == "n2n":
@@ -76,12 +77,14 @@ def _run(fit: Fit, evaluations: set[str], samples: int | None) -> dict[str, Any]
         method, about = BASELINES.build(fit.method), {}
     seconds = time.perf_counter() - start
     results = {}
-    for evaluation in sorted(evaluations - {""}):
+    for evaluation, floors in sorted(evaluations.items()):
+        if not evaluation:
+            continue
         task, protocol = evaluation.split("/")
         prediction, seconds_task = _predict(method, task, noisy)
-        scored = _protocol(protocol, samples).evaluate(prediction, truth, noisy)
+        scored = _protocol(protocol, floors, samples).evaluate(prediction, truth, noisy)
         results[evaluation] = {
-            "definition": protocol_hash(protocol),
+            **_asked(evaluation, floors),
             "values": _short(scored.values),
             "floors": {name: _short(values) for name, values in scored.floors.items()},
             "blanks": {**scored.blanks, **scored.floor_blanks},
@@ -95,15 +98,19 @@ def _run(fit: Fit, evaluations: set[str], samples: int | None) -> dict[str, Any]
     }
 
 
-def _protocol(name: str, samples: int | None) -> Protocol:
+def _asked(evaluation: str, floors: Set[str]) -> dict[str, Any]:
+    return {"definition": protocol_hash(evaluation.split("/")[1]), "asked": sorted(floors)}
+
+
+def _protocol(name: str, floors: Set[str], samples: int | None) -> Protocol:
+    """Return a protocol that measures only the floors wanted: to draw a large cloud anew can take longer than a fit."""
     protocol = load_protocol(name)
-    if samples is None:
-        return protocol
     sides = {side: dict(getattr(protocol, side)) for side in ("reference", "prediction")}
     for side in sides.values():
-        if side["samples"] is not None:
+        if samples is not None and side["samples"] is not None:
             side["samples"] = min(side["samples"], samples)
-    return dataclasses.replace(protocol, **sides)
+    kept = {floor: arguments for floor, arguments in protocol.floors.items() if floor in floors}
+    return dataclasses.replace(protocol, floors=kept, **sides)
 
 
 def _predict(method: Any, task: str, noisy: np.ndarray) -> tuple[Any, float]:

@@ -18,12 +18,12 @@ class Job:
 
     Attributes:
         fit: What to run.
-        evaluations: `task/protocol`; an empty text where only the cost counts.
+        evaluations: `task/protocol` and the floors wanted with it; an empty text where only the cost counts.
         tables: Who wants it.
     """
 
     fit: Fit
-    evaluations: set[str] = field(default_factory=set)
+    evaluations: dict[str, set[str]] = field(default_factory=dict)
     tables: set[str] = field(default_factory=set)
 
 
@@ -50,7 +50,9 @@ class Plan:
     def is_done(self, job: Job, store: Store) -> bool:
         """Tell whether the store holds all of a job by the present definitions."""
         record = store.read(job.fit)
-        return record is not None and record["status"] == "done" and not lacking(record, job.evaluations, self.protocols)
+        return (
+            record is not None and record["status"] == "done" and not lacking(record, job.evaluations, self.protocols)
+        )
 
     def stale(self, store: Store) -> list[Job]:
         """Return the jobs that are done, but by other sources than these."""
@@ -59,9 +61,9 @@ class Plan:
 
     @functools.cached_property
     def protocols(self) -> dict[str, str]:
-        """Content hash of every protocol in use."""
-        names = {e.split("/")[1] for job in self.jobs.values() for e in job.evaluations if e}
-        return {name: protocol_hash(name) for name in names}
+        """Content hash of the protocol of every evaluation."""
+        evaluations = {e for job in self.jobs.values() for e in job.evaluations if e}
+        return {evaluation: protocol_hash(evaluation.split("/")[1]) for evaluation in evaluations}
 
 
 def make_plan(names: Sequence[str], profile: Profile, root: str | None = None) -> Plan:
@@ -77,11 +79,15 @@ def make_plan(names: Sequence[str], profile: Profile, root: str | None = None) -
         for cell in wanted:
             for fit in cell.fits:
                 job = jobs.setdefault(fit, Job(fit))
-                job.evaluations.add(cell.evaluation)
+                job.evaluations.setdefault(cell.evaluation, set()).update({cell.floor} - {""})
                 job.tables.add(name)
     asked = {table.name for table in chosen}
     ordered = {
-        fit: jobs[fit] for table in chosen for cell in cells[table.name] for fit in cell.fits if jobs[fit].tables & asked
+        fit: jobs[fit]
+        for table in chosen
+        for cell in cells[table.name]
+        for fit in cell.fits
+        if jobs[fit].tables & asked
     }
     return Plan(profile, chosen, {name: cells[name] for name in asked}, ordered)
 

@@ -47,7 +47,9 @@ def run(plan: Plan, store: Store, workers: int, again: bool = False, told: Told 
     return failures
 
 
-def _pass(measure: Callable[[Job], dict], jobs: list[Job], workers: int, finish: Callable[[Job, dict], None]) -> list[Job]:
+def _pass(
+    measure: Callable[[Job], dict], jobs: list[Job], workers: int, finish: Callable[[Job, dict], None]
+) -> list[Job]:
     """Run jobs; return those that were lost because a process died."""
     lost: list[Job] = []
     if not jobs:

@@ -72,6 +72,12 @@ class Wanted:
     reason: str = ""
     notes: list[str] = field(default_factory=list)
 
+    @property
+    def floor(self) -> str:
+        """Which floor of the evaluation is wanted; empty for the value itself."""
+        group = self.value.rpartition(".")[0]
+        return "" if group == "cost" else group
+
 
 @dataclass
 class Table:

@@ -25,7 +25,11 @@ def write_tables(plan: Plan, store: Store, out: Path) -> dict[str, Rendered]:
             *(f"Of the paper's table: {note}." for note in paper.notes),
         ]
         made[table.name] = render(f"{table.name}: {table.title}", about, grid)
-        for suffix, text in (("md", made[table.name].markdown), ("tex", made[table.name].latex), ("csv", made[table.name].csv)):
+        for suffix, text in (
+            ("md", made[table.name].markdown),
+            ("tex", made[table.name].latex),
+            ("csv", made[table.name].csv),
+        ):
             _write(out / f"{table.name}.{suffix}", text)
     _write(out / "index.md", _index(plan, store, made))
     return made
