@@ -47,9 +47,6 @@ def outliers(points: NDArray[np.float64]) -> NDArray[np.bool_]:
     new[1:] = (points[order[1:]] != points[order[:-1]]).any(axis=1)
     distinct = points[order[new]]
     kept = np.arange(len(distinct))
-    if len(distinct) > _NEIGHBOUR:
-        reach = cKDTree(distinct).query(distinct, [_NEIGHBOUR + 1], workers=-1)[0][:, 0]
-        kept = kept[reach <= _LONELY * np.median(reach)]
     for _ in range(_ROUNDS):
         found = _most_evident(distinct[kept])
         if not found.any():
@@ -63,11 +60,17 @@ def outliers(points: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def _most_evident(points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Tell which points are alone in the cloud, (n,); where none is, which are outliers among their neighbours."""
     found = np.zeros(len(points), bool)
-    if len(points) < _FEWEST:
+    if len(points) <= _NEIGHBOUR:
         return found
     tree = cKDTree(points)
-    reach = tree.query(points, [min(k, len(points) // 4) + 1 for k in _REACHES], workers=-1)[0]
+    reaches = [min(k, len(points) - 1, max(len(points) // 4, _NEIGHBOUR)) for k in (_NEIGHBOUR, *_REACHES)]
+    reach = tree.query(points, [k + 1 for k in reaches], workers=-1)[0]
+    found = reach[:, 0] > _LONELY * np.median(reach[:, 0])
+    if found.any() or len(points) < _FEWEST:
+        return found
+    reach = reach[:, 1:]
     usual = _usual(points, reach)
     suspected = (reach > _SUSPECT * usual).any(axis=1)
     suspects = np.flatnonzero(suspected)
@@ -84,16 +87,15 @@ def _most_evident(points: NDArray[np.float64]) -> NDArray[np.bool_]:
 def _usual(points: NDArray[np.float64], reach: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the median reaches around each point, like `reach` (n, r), from some of all points.
 
-    The surroundings are wide, so that where outliers are alone with each other the surface nearby still decides.
+    The surroundings are wide, so that where outliers are alone with each other the surface nearby still decides. They
+    change slowly: every point takes those of the nearest of the some.
     """
     count = min(len(points), max(len(points) // _THINNING, 25 * _AROUND))
     some = np.random.default_rng(0).permutation(len(points))[:count]
-    tree, usual = cKDTree(points[some]), np.empty_like(reach)
-    for start in range(0, len(points), _CHUNK):
-        chunk = slice(start, start + _CHUNK)
-        around = tree.query(points[chunk], min(_AROUND, count), workers=-1)[1]
-        usual[chunk] = np.median(reach[some[around]], axis=1)
-    return usual
+    tree = cKDTree(points[some])
+    around = tree.query(points[some], min(_AROUND, count), workers=-1)[1]
+    usual = np.median(reach[some[around]], axis=1)
+    return usual[tree.query(points, workers=-1)[1]]
 
 
 def _against_patch(

@@ -37,7 +37,10 @@ FIGURES = {
         "n2n.report.figures.noise:kinds", "every model of noise: scan and surface", {"noise": 0.015}, own_scan=False
     ),
     "large_noise": Figure(
-        "n2n.report.figures.noise:amounts", "noise of 2 to 10 % of the radius: scan and surface", own_scan=False
+        "n2n.report.figures.noise:amounts",
+        "noise of 2 to 10 % of the radius: scan and surface",
+        {"shape": "torus"},
+        own_scan=False,
     ),
     "distances": Figure(
         "n2n.report.figures.distances:draw", "Chamfer distance against earth mover's distance", {"noise": 0.02}

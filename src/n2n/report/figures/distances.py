@@ -23,9 +23,7 @@ def draw(request: Request) -> Figure:
     errors = [point_errors(points, subject, field) for points, field in zip(moved, fields.values(), strict=True)]
     misses = [surface_errors(mesh.vertices, subject) for mesh in meshes]
     known = subject.vertices is not None
-    scale = Scale(
-        max(map(upper, errors)), f"distance to the {'true' if known else 'fitted'} surface  [{subject.unit}]"
-    )
+    scale = Scale(max(map(upper, errors)), f"distance to the {'true' if known else 'fitted'} surface  [{subject.unit}]")
 
     def cloud(points, error):
         return Panel(cloud_image(points, scale(error), camera, request.size), summary(error, subject))
@@ -38,6 +36,8 @@ def draw(request: Request) -> Figure:
         )
         for mesh, miss in zip(meshes, misses, strict=True)
     ]
-    truth = Panel(mesh_image(subject.vertices, subject.faces, SURFACE, camera, request.size), "truth") if known else None
+    truth = (
+        Panel(mesh_image(subject.vertices, subject.faces, SURFACE, camera, request.size), "truth") if known else None
+    )
     rows = [[cloud(subject.noisy, noise), *map(cloud, moved, errors)], [truth, *surfaces]]
     return gallery(rows, ["noisy", *fields], ["points", "surface"], scale)

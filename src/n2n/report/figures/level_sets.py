@@ -48,7 +48,9 @@ def draw(request: Request) -> Figure:
         axes.set_title(f"cut across {_AXES[cut.axis]}", fontsize=12, color=INK)
         left += width + _GAP
     shown_levels = levels[(levels >= lowest) & (levels <= highest)]
-    bar = figure.colorbar(image, cax=place(figure, left, _TITLE, 14, height), ticks=shown_levels, spacing="proportional")
+    bar = figure.colorbar(
+        image, cax=place(figure, left, _TITLE, 14, height), ticks=shown_levels, spacing="proportional"
+    )
     bar.set_label(f"signed distance  [{subject.unit}]", fontsize=10, color=INK)
     bar.ax.tick_params(labelsize=9, colors=INK)
     bar.outline.set_visible(False)

@@ -1,6 +1,8 @@
 """Kinds and amounts of noise: what comes in and what comes out."""
 
+import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from n2n.geometry.noise import NOISE_MODELS
 from n2n.report.figures.errors import RESOLUTION, summary, surface_errors, upper
@@ -9,7 +11,7 @@ from n2n.report.figures.style import NOISY, Panel, Scale, camera_for, cloud_imag
 
 _AMOUNTS = (0.02, 0.04, 0.06, 0.08, 0.10)
 _PANEL = 0.6  # of the request's size: these figures have many panels
-_TITLES = {"range": "range (along the ray)", "outliers": "5 % outliers"}
+_TITLES = {"gaussian": "Gaussian", "laplace": "Laplace", "range": "range (along the ray)", "outliers": "5 % outliers"}
 
 
 def kinds(request: Request) -> Figure:
@@ -20,21 +22,28 @@ def kinds(request: Request) -> Figure:
 
 def amounts(request: Request) -> Figure:
     """Draw scan and surface for Gaussian noise of 2 to 10 % of the bounding radius."""
-    return _columns(request, {f"{amount:.0%}": request.subject(noise=amount) for amount in _AMOUNTS})
+    return _columns(request, {f"{100 * amount:g} %": request.subject(noise=amount) for amount in _AMOUNTS})
 
 
 def _columns(request: Request, subjects: dict[str, Subject]) -> Figure:
-    size, camera = round(_PANEL * request.size), None
+    # The noisiest scan needs the widest view.
+    size, camera = round(_PANEL * request.size), camera_for(max((s.noisy for s in subjects.values()), key=_spread))
     scans, meshes, errors = [], [], []
     for number, (title, subject) in enumerate(subjects.items(), 1):
-        camera = camera or camera_for(subject.vertices)
         scans.append(Panel(cloud_image(subject.noisy, NOISY, camera, size)))
         field = request.fit(subject, f"fitting {number} of {len(subjects)}: {title}")
         meshes.append(field.reconstruct(RESOLUTION))
         errors.append(surface_errors(meshes[-1].vertices, subject))
-    scale = Scale(max(map(upper, errors)), f"distance to the true surface  [{subject.unit}]")
+    # One surface that goes wrong does not take the colour off all others.
+    scale = Scale(
+        float(np.median([upper(error) for error in errors])), f"distance to the true surface  [{subject.unit}]"
+    )
     surfaces = [
         Panel(mesh_image(mesh.vertices, mesh.faces, scale(error), camera, size), summary(error, subject).split(",")[0])
         for mesh, error in zip(meshes, errors, strict=True)
     ]
     return gallery([scans, surfaces], list(subjects), ["noisy", "surface"], scale)
+
+
+def _spread(points: NDArray[np.float64]) -> float:
+    return float(np.quantile(np.linalg.norm(points - np.median(points, axis=0), axis=1), 0.99))

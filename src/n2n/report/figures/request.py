@@ -89,7 +89,9 @@ class Request:
         """Return the scan; `noise` and `model` say what else than the request's own noise it has."""
         if self.scan:
             cloud = read_cloud(Path(self.scan))
-            return Subject(Path(self.scan).stem, "units of the scan", check_cloud(cloud.points[cloud.finite()], self.scan))
+            return Subject(
+                Path(self.scan).stem, "units of the scan", check_cloud(cloud.points[cloud.finite()], self.scan)
+            )
         made = GeneratedDataModule if self.shape in SHAPES else PUDataModule
         noise = self.noise if noise is None else noise
         data = made(shape=self.shape, points=self.points, noise=noise, noise_model=model, seed=self.seed)

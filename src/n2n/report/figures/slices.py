@@ -82,7 +82,9 @@ class Slice:
 
     def prepare(self, axes: Axes) -> None:
         """Show this window and nothing around it."""
-        axes.set(xlim=(self.low[0], self.high[0]), ylim=(self.low[1], self.high[1]), aspect="equal", xticks=[], yticks=[])
+        axes.set(
+            xlim=(self.low[0], self.high[0]), ylim=(self.low[1], self.high[1]), aspect="equal", xticks=[], yticks=[]
+        )
         for spine in axes.spines.values():
             spine.set(color="#d5d9df", linewidth=0.8)
 

@@ -32,7 +32,7 @@ QUERIES = ("#1b7f5c", "#7b4fa3", "#c4487a")
 
 _DPI = 100
 _TITLE, _CAPTION, _BAR, _SIDE, _GAP = 34, 24, 96, 30, 8  # pixels
-_BALL = 0.5  # radius of a point's ball; times the picture's extent / sqrt(points)
+_BALL = 0.42  # radius of a point's ball; times the picture's extent / sqrt(points)
 
 
 class Panel(NamedTuple):
@@ -121,7 +121,9 @@ def gallery(
 def place(figure: Figure, left: float, top: float, width: float, height: float) -> Axes:
     """Add axes at a place given in pixels from the upper left corner."""
     full_width, full_height = figure.get_size_inches() * _DPI
-    return figure.add_axes((left / full_width, 1 - (top + height) / full_height, width / full_width, height / full_height))
+    return figure.add_axes(
+        (left / full_width, 1 - (top + height) / full_height, width / full_width, height / full_height)
+    )
 
 
 def colour_bar(figure: Figure, scale: Scale, left: float, top: float, height: float) -> None:

@@ -93,8 +93,19 @@ def watch(
         generator = torch.Generator().manual_seed(seed * 1_000_003 + start)
         block = objective.begin(sdf, data.transfer_batch_to_device(draw, device, 0), generator, start / iterations)
         pulled = Field(sdf, data.frames, config).denoise(queries)
-        targets = np.concatenate([targets, data.frames[0].to_world(_matched(block, data.frames[0].to_unit(pulled)))[None]])
-        _steps(sdf, objective, block, optimizer, scheduler, range(start, min(start + reuse, iterations)), iterations, generator)
+        targets = np.concatenate(
+            [targets, data.frames[0].to_world(_matched(block, data.frames[0].to_unit(pulled)))[None]]
+        )
+        _steps(
+            sdf,
+            objective,
+            block,
+            optimizer,
+            scheduler,
+            range(start, min(start + reuse, iterations)),
+            iterations,
+            generator,
+        )
         if report:
             report(min(start + reuse, iterations), iterations, {})
     look(iterations)
