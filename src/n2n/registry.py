@@ -200,7 +200,9 @@ DATAMODULES = Registry(
         "pc": Builtin("n2n.datamodules.pointcleannet:PCDataModule", "the PointCleanNet test shapes, noise added"),
         "pu": Builtin("n2n.datamodules.punet:PUDataModule", "the PU-Net test shapes, Poisson-disk clouds, noise added"),
         "scene3d": Builtin("n2n.datamodules.scene3d:Scene3DDataModule", "3D Scene: indoor scans of Zhou and Koltun"),
-        "shapenet": Builtin("n2n.datamodules.shapenet:ShapeNetDataModule", "ShapeNet in the layout of Occupancy Networks"),
+        "shapenet": Builtin(
+            "n2n.datamodules.shapenet:ShapeNetDataModule", "ShapeNet in the layout of Occupancy Networks"
+        ),
         "srb": Builtin("n2n.datamodules.srb:SRBDataModule", "Surface Reconstruction Benchmark: simulated range scans"),
     },
 )

@@ -7,7 +7,7 @@ import pytest
 from n2n.cli.main import main
 from n2n.report.figures import FIGURES
 
-QUICK = ["shape=bracket", "points=1500", "size=120", "debug=default"]
+QUICK = ["shape=bracket", "points=1500", "size=120", "resolution=32", "debug=default"]
 
 
 def test_a_figure_is_drawn_into_a_new_folder(tmp_path, capsys):

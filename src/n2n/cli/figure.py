@@ -8,7 +8,9 @@ settings:
   shape=NAME            bracket, sphere, torus, or a PU-Net test shape where its data is present (bracket)
   scan=FILE             a noisy scan of your own instead of a shape
   points=N noise=S      of the shape's scan; S relative to the bounding radius
-  seed=K size=PIXELS    size of a panel's longer side (480)
+  seed=K                of the scan and of the fit (0)
+  size=PIXELS           size of a panel's longer side (480)
+  resolution=N          voxels along the longest side of the surfaces shown (128)
   key=value             any setting of the fit, e.g. effort=3
 
 examples:

@@ -17,6 +17,7 @@ from n2n.fitting.objective import DENOISED_POINTS
 from n2n.geometry.scale import Scales, estimate_scales
 
 _PROBED_POINTS = 40_000
+_NOISE = 0.88  # of the measured noise: a cloud bears a little less smoothing than its noise seems to ask for
 _NOISE_FLOOR = 0.05  # of the spacing: a clean cloud still has one length that limits what can be known
 _VOXEL = 0.28
 _STIFFNESS = 1.75
@@ -117,8 +118,8 @@ def measure(observations: list[NDArray[np.float64]], seed: int = 0) -> tuple[Sca
 
 def choose(scales: Scales, observations: list[NDArray[np.float64]]) -> Chosen:
     """Turn measured scales into the parameters of the fast recipe."""
-    noise = max(scales.noise, _NOISE_FLOOR * scales.spacing)
-    pad = max(0.12, 4 * noise, scales.spacing)
+    noise = max(_NOISE * scales.noise, _NOISE_FLOOR * scales.spacing)
+    pad = max(0.12, 4 * scales.noise, scales.spacing)
     total = sum(map(len, observations))
     seen = min(total, _SEEN_BATCHES * _MAX_BATCH)
     sampled = min(DENOISED_POINTS, max(map(len, observations)))

@@ -29,3 +29,20 @@ def test_scaling_the_points_scales_the_lengths():
     assert large.noise == pytest.approx(100 * small.noise)
     assert large.spacing == pytest.approx(100 * small.spacing)
     assert large.patch == small.patch
+
+
+@pytest.mark.parametrize("spacing", [0.4, 0.7, 1.0, 1.6, 3.0])
+def test_dense_or_sparse_a_flat_sheet_tells_its_noise_and_spacing(spacing):
+    random, count = np.random.default_rng(2), 20_000
+    side = spacing * np.sqrt(count)
+    flat = np.c_[random.uniform(0, side, (count, 2)), np.zeros(count)]
+    scales = estimate_scales(flat + random.standard_normal(flat.shape))
+    assert scales.noise == pytest.approx(1, rel=0.08)
+    assert scales.spacing == pytest.approx(spacing, rel=0.08)
+
+
+def test_the_wall_of_a_thin_shell_is_not_noise():
+    random, count = np.random.default_rng(3), 10_000
+    side = np.sqrt(count / 2)  # two sheets, spacing 1 on each, five deviations apart
+    sheets = np.c_[random.uniform(0, side, (count, 2)), 2.5 * random.choice([-1, 1], count)]
+    assert estimate_scales(sheets + 0.5 * random.standard_normal(sheets.shape)).noise < 0.6

@@ -2,9 +2,10 @@
 
 from matplotlib.figure import Figure
 
-from n2n.report.figures.errors import RESOLUTION, point_errors, summary, surface_errors, upper
+from n2n.report.camera import Camera
+from n2n.report.figures.errors import point_errors, summary, surface_errors, upper
 from n2n.report.figures.request import Request
-from n2n.report.figures.style import SURFACE, Panel, Scale, camera_for, cloud_image, gallery, mesh_image
+from n2n.report.figures.style import SURFACE, Panel, Scale, cloud_image, gallery, mesh_image
 
 _DISTANCES = {"cd": "Chamfer distance", "emd_squared": "earth mover's distance"}
 
@@ -12,18 +13,18 @@ _DISTANCES = {"cd": "Chamfer distance", "emd_squared": "earth mover's distance"}
 def draw(request: Request) -> Figure:
     """Draw denoised points and surface under both distances, between the scan and the truth."""
     subject = request.subject()
-    camera = camera_for(subject.noisy if subject.vertices is None else subject.vertices)
+    camera = Camera.around(subject.extent, up=subject.up)
     fields = {
         title: request.fit(subject, f"fitting with the {title}", f"distance={name}")
         for name, title in _DISTANCES.items()
     }
     moved = [field.denoise(subject.noisy) for field in fields.values()]
-    meshes = [field.reconstruct(RESOLUTION) for field in fields.values()]
+    meshes = [field.reconstruct(request.resolution) for field in fields.values()]
     noise = point_errors(subject.noisy, subject, list(fields.values())[-1])
     errors = [point_errors(points, subject, field) for points, field in zip(moved, fields.values(), strict=True)]
     misses = [surface_errors(mesh.vertices, subject) for mesh in meshes]
     known = subject.vertices is not None
-    scale = Scale(max(map(upper, errors)), f"distance to the {'true' if known else 'fitted'} surface  [{subject.unit}]")
+    scale = Scale(max(map(upper, errors)), f"distance to the {'true' if known else 'fitted'} surface\n[{subject.unit}]")
 
     def cloud(points, error):
         return Panel(cloud_image(points, scale(error), camera, request.size), summary(error, subject))

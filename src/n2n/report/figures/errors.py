@@ -6,11 +6,10 @@ from numpy.typing import NDArray
 
 from n2n.metrics.nearest import nearest
 from n2n.metrics.point_mesh import distances_to_mesh
+from n2n.report.camera import Camera
 from n2n.report.figures.request import Request, Subject
-from n2n.report.figures.style import Panel, Scale, camera_for, cloud_image, gallery, mesh_image
+from n2n.report.figures.style import Panel, Scale, cloud_image, gallery, mesh_image
 from n2n.tasks.field import Field
-
-RESOLUTION = 128
 
 
 def denoising(request: Request) -> Figure:
@@ -22,8 +21,8 @@ def denoising(request: Request) -> Figure:
     field = request.fit(subject)
     clean = field.denoise(subject.noisy)
     before, after = (point_errors(points, subject, field) for points in (subject.noisy, clean))
-    scale = Scale(upper(before), f"{_what(subject)}  [{subject.unit}]")
-    camera = camera_for(subject.noisy if subject.vertices is None else subject.vertices)
+    scale = Scale(upper(before), f"{_what(subject)}\n[{subject.unit}]")
+    camera = Camera.around(subject.extent, up=subject.up)
     panels = [
         Panel(cloud_image(points, scale(error), camera, request.size), summary(error, subject))
         for points, error in ((subject.noisy, before), (clean, after))
@@ -36,11 +35,11 @@ def reconstruction(request: Request) -> Figure:
     subject = request.subject()
     field = request.fit(subject)
     with request.progress("extracting the surface"):
-        mesh = field.reconstruct(RESOLUTION)
+        mesh = field.reconstruct(request.resolution)
     before, after = point_errors(subject.noisy, subject, field), surface_errors(mesh.vertices, subject)
     # The scale is the surface's own: next to the noise its errors would all look alike.
-    scale = Scale(upper(after, 0.995), f"{_what(subject, surface=True)}  [{subject.unit}]")
-    camera = camera_for(subject.noisy if subject.vertices is None else subject.vertices)
+    scale = Scale(upper(after, 0.995), f"{_what(subject, surface=True)}\n[{subject.unit}]")
+    camera = Camera.around(subject.extent, up=subject.up)
     noisy = Panel(cloud_image(subject.noisy, scale(before), camera, request.size), summary(before, subject))
     surface = mesh_image(mesh.vertices, mesh.faces, scale(after), camera, request.size)
     row, titles = [noisy, Panel(surface, summary(after, subject))], [f"{len(subject.noisy):,} noisy points", "surface"]
@@ -51,7 +50,7 @@ def reconstruction(request: Request) -> Figure:
     return gallery([row], titles, scale=scale)
 
 
-def point_errors(points: NDArray[np.float64], subject: Subject, field: Field) -> NDArray[np.float64]:
+def point_errors(points: NDArray[np.float64], subject: Subject, field: Field | None) -> NDArray[np.float64]:
     """Return distances (n,) to the true surface, or to the fitted one where the truth is not known."""
     if subject.vertices is None:
         return np.abs(field.sdf_at(points))

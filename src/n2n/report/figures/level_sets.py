@@ -5,10 +5,10 @@ from matplotlib.colors import TwoSlopeNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from n2n.report.figures.errors import RESOLUTION
+from n2n.report.camera import Camera
 from n2n.report.figures.request import Request
 from n2n.report.figures.slices import Slice, draw_truth, draw_zero
-from n2n.report.figures.style import INK, SIGNED, SURFACE, camera_for, mesh_image, place, sheet
+from n2n.report.figures.style import INK, SIGNED, SURFACE, mesh_image, place, sheet
 
 _LINES = 14
 _SAMPLES = 240
@@ -20,12 +20,14 @@ def draw(request: Request) -> Figure:
     """Draw cuts across z, y and x through the middle, and the zero level set as a surface."""
     subject = request.subject()
     field = request.fit(subject)
-    mesh = field.reconstruct(RESOLUTION)
+    mesh = field.reconstruct(request.resolution)
     cuts = [Slice.through(np.asarray(mesh.vertices), axis) for axis in (2, 1, 0)]
     values = [cut.values(field, _SAMPLES) for cut in cuts]
     height = round(0.8 * request.size)
     widths = [round(height * cut.aspect) for cut in cuts]
-    picture = mesh_image(mesh.vertices, mesh.faces, SURFACE, camera_for(np.asarray(mesh.vertices)), request.size)
+    picture = mesh_image(
+        mesh.vertices, mesh.faces, SURFACE, Camera.around(np.asarray(mesh.vertices), up=subject.up), request.size
+    )
     shown = round(height * picture.shape[1] / picture.shape[0])
     figure = sheet(sum(widths) + shown + 4 * _GAP + _BAR, height + _TITLE + _BELOW)
     lowest, highest = min(v.min() for *_, v in values), max(v.max() for *_, v in values)

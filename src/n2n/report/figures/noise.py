@@ -2,12 +2,12 @@
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from n2n.geometry.noise import NOISE_MODELS
-from n2n.report.figures.errors import RESOLUTION, summary, surface_errors, upper
+from n2n.report.camera import Camera
+from n2n.report.figures.errors import summary, surface_errors, upper
 from n2n.report.figures.request import Request, Subject
-from n2n.report.figures.style import NOISY, Panel, Scale, camera_for, cloud_image, gallery, mesh_image
+from n2n.report.figures.style import NOISY, Panel, Scale, cloud_image, gallery, mesh_image
 
 _AMOUNTS = (0.02, 0.04, 0.06, 0.08, 0.10)
 _PANEL = 0.6  # of the request's size: these figures have many panels
@@ -27,16 +27,17 @@ def amounts(request: Request) -> Figure:
 
 def _columns(request: Request, subjects: dict[str, Subject]) -> Figure:
     # The noisiest scan needs the widest view.
-    size, camera = round(_PANEL * request.size), camera_for(max((s.noisy for s in subjects.values()), key=_spread))
+    widest = max(subjects.values(), key=_spread)
+    size, camera = round(_PANEL * request.size), Camera.around(widest.noisy, up=widest.up)
     scans, meshes, errors = [], [], []
     for number, (title, subject) in enumerate(subjects.items(), 1):
         scans.append(Panel(cloud_image(subject.noisy, NOISY, camera, size)))
         field = request.fit(subject, f"fitting {number} of {len(subjects)}: {title}")
-        meshes.append(field.reconstruct(RESOLUTION))
+        meshes.append(field.reconstruct(request.resolution))
         errors.append(surface_errors(meshes[-1].vertices, subject))
     # One surface that goes wrong does not take the colour off all others.
     scale = Scale(
-        float(np.median([upper(error) for error in errors])), f"distance to the true surface  [{subject.unit}]"
+        float(np.median([upper(error) for error in errors])), f"distance to the true surface\n[{subject.unit}]"
     )
     surfaces = [
         Panel(mesh_image(mesh.vertices, mesh.faces, scale(error), camera, size), summary(error, subject).split(",")[0])
@@ -45,5 +46,6 @@ def _columns(request: Request, subjects: dict[str, Subject]) -> Figure:
     return gallery([scans, surfaces], list(subjects), ["noisy", "surface"], scale)
 
 
-def _spread(points: NDArray[np.float64]) -> float:
-    return float(np.quantile(np.linalg.norm(points - np.median(points, axis=0), axis=1), 0.99))
+def _spread(subject: Subject) -> float:
+    """Return how far points reach, but for the 1 % farthest: these may be outliers."""
+    return float(np.quantile(np.linalg.norm(subject.noisy - np.median(subject.noisy, axis=0), axis=1), 0.99))

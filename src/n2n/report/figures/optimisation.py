@@ -27,7 +27,7 @@ _SETTINGS = (
 _SHARES = (0.0, 0.1, 0.35, 1.0)
 _SAMPLES = 220
 _AXIS = 1
-_WINDOW = 0.16  # half the width of the close-up; of the cloud's bounding radius
+_WINDOW = 0.2  # half the width of the close-up; of the cloud's bounding radius
 _THICK = 0.02  # half the thickness of the slab whose points are shown; of the bounding radius
 _TITLE, _GAP, _KEY = 34, 12, 40
 
@@ -86,9 +86,9 @@ def _inside(window: Slice, points: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def _spread(points: NDArray[np.float64], count: int) -> NDArray[np.float64]:
-    """Return `count` of the points far from each other, away from the window's rim: the first is the most central."""
+    """Return `count` of the points far from each other, away from the rim; the first is the most central."""
     middle = points.mean(axis=0)
-    inner = points[np.argsort(np.linalg.norm(points - middle, axis=1))[: max(count, len(points) // 2)]]
+    inner = points[np.argsort(np.linalg.norm(points - middle, axis=1))[: max(count, 2 * len(points) // 3)]]
     chosen = [0]
     while len(chosen) < count:
         gaps = np.linalg.norm(inner[:, None] - inner[chosen], axis=2).min(axis=1)

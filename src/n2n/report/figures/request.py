@@ -20,6 +20,7 @@ from n2n.formats import read_cloud
 from n2n.geometry.checks import check_cloud
 from n2n.geometry.shapes import SHAPES
 from n2n.registry import suggest
+from n2n.report.preview import up_axis
 from n2n.tasks.api import fit_clouds
 
 if TYPE_CHECKING:
@@ -27,8 +28,8 @@ if TYPE_CHECKING:
     from n2n.tasks.field import Field
 
 Progress = Callable[[str], AbstractContextManager[Any]]
-_LEAST = {"points": 100, "size": 50}
-_UNITS = {"bracket": "mm"}
+_LEAST = {"points": 100, "size": 50, "resolution": 8}
+_UNITS = {"bracket": "mm", "torus": "outer radius = 0.95"}
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,7 @@ class Subject:
         unit: Of lengths, for colour bars.
         noisy: (n, 3).
         vertices, faces: The true surface, (v, 3) and (f, 3); None for a scan of the user's own.
+        up: Axis that points up, 0 to 2.
     """
 
     name: str
@@ -47,12 +49,18 @@ class Subject:
     noisy: NDArray[np.float64]
     vertices: NDArray[np.float64] | None = None
     faces: NDArray[np.int64] | None = None
+    up: int = 2
+
+    @property
+    def extent(self) -> NDArray[np.float64]:
+        """The points a picture must hold: the true surface, or the scan without it."""
+        return self.noisy if self.vertices is None else self.vertices
 
     @cached_property
     def radius(self) -> float:
         """Bounding radius of the true surface, or of the scan without it."""
-        points = self.noisy if self.vertices is None else self.vertices
-        return float(np.linalg.norm(points - (points.min(axis=0) + points.max(axis=0)) / 2, axis=1).max())
+        low, high = self.extent.min(axis=0), self.extent.max(axis=0)
+        return float(np.linalg.norm(self.extent - (low + high) / 2, axis=1).max())
 
 
 @contextmanager
@@ -72,6 +80,7 @@ class Request:
         noise: Its standard deviation relative to the bounding radius.
         seed: Of the scan and of the fit.
         size: Pixels of a panel's longer side.
+        resolution: Voxels along the longest side of the surfaces that are shown.
         overrides: Settings of the fit.
         progress: Label -> context manager that yields a fit's `report`.
     """
@@ -82,6 +91,7 @@ class Request:
     noise: float = 0.01
     seed: int = 0
     size: int = 480
+    resolution: int = 128
     overrides: tuple[str, ...] = ()
     progress: Progress = field(default=silent)
 
@@ -89,14 +99,16 @@ class Request:
         """Return the scan; `noise` and `model` say what else than the request's own noise it has."""
         if self.scan:
             cloud = read_cloud(Path(self.scan))
-            return Subject(
-                Path(self.scan).stem, "units of the scan", check_cloud(cloud.points[cloud.finite()], self.scan)
-            )
-        made = GeneratedDataModule if self.shape in SHAPES else PUDataModule
+            noisy = check_cloud(cloud.points[cloud.finite()], self.scan)
+            return Subject(Path(self.scan).stem, "units of the scan", noisy, up=up_axis(noisy))
+        generated = self.shape in SHAPES
+        made = GeneratedDataModule if generated else PUDataModule
         noise = self.noise if noise is None else noise
         data = made(shape=self.shape, points=self.points, noise=noise, noise_model=model, seed=self.seed)
         unit = _UNITS.get(self.shape, "bounding radius = 1")
-        return Subject(self.shape, unit, data.noisy, data.reference.vertices, data.reference.faces)
+        # Most of the PU-Net meshes stand on their y axis.
+        up = 2 if generated else 1
+        return Subject(self.shape, unit, data.noisy, data.reference.vertices, data.reference.faces, up)
 
     def config(self, *settings: str) -> dict[str, Any]:
         """Return the configuration of a fit: `settings` of the figure, then those of the user."""

@@ -1,6 +1,7 @@
 """Plane cuts through a field, a mesh and a cloud."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -8,7 +9,6 @@ from matplotlib.collections import LineCollection
 from numpy.typing import NDArray
 
 from n2n.report.figures.style import FAINT, INK
-from n2n.tasks.field import Field
 
 _MARGIN = 0.08  # of the longer side
 
@@ -54,8 +54,8 @@ class Slice:
         """Tell which points (n,) lie within `reach` of the plane."""
         return np.abs(points[:, self.axis] - self.level) <= reach
 
-    def values(self, field: Field, resolution: int) -> tuple[NDArray, NDArray, NDArray[np.float64]]:
-        """Return x (w,), y (h,) and signed distances (h, w); `resolution` samples the longer side."""
+    def values(self, field: Any, resolution: int) -> tuple[NDArray, NDArray, NDArray[np.float64]]:
+        """Return x (w,), y (h,) and the signed distances (h, w) of a `Field`; `resolution` samples the longer side."""
         extent = self.high - self.low
         width, height = np.maximum(2, np.round(resolution * extent / extent.max())).astype(int)
         x, y = np.linspace(self.low[0], self.high[0], width), np.linspace(self.low[1], self.high[1], height)

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from n2n.formats import atomic_path
 from n2n.report.camera import Camera
-from n2n.report.preview import up_axis
 from n2n.report.scene import Spheres, Surface, render
 
 Image = NDArray[np.uint8]
+Pixels = int | float
 
 INK, FAINT = "#2b2f36", "#8a919c"
 NOISY = np.array([0.80, 0.36, 0.22])
@@ -31,7 +31,7 @@ SIGNED = LinearSegmentedColormap.from_list("signed", ["#274f7d", "#86abcc", "#ff
 QUERIES = ("#1b7f5c", "#7b4fa3", "#c4487a")
 
 _DPI = 100
-_TITLE, _CAPTION, _BAR, _SIDE, _GAP = 34, 24, 96, 30, 8  # pixels
+_TITLE, _CAPTION, _BAR, _SIDE, _GAP = 34, 24, 128, 30, 8  # pixels
 _BALL = 0.42  # radius of a point's ball; times the picture's extent / sqrt(points)
 
 
@@ -52,11 +52,6 @@ class Scale(NamedTuple):
     def __call__(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return colours (n, 3) of values (n,)."""
         return self.colours(Normalize(0, self.highest)(values))[:, :3]
-
-
-def camera_for(points: NDArray[np.float64]) -> Camera:
-    """Return the camera that every panel of a figure shares."""
-    return Camera.around(points, up=up_axis(points))
 
 
 def cloud_image(points: NDArray[np.float64], colour: NDArray[np.float64], camera: Camera, size: int) -> Image:
@@ -118,15 +113,13 @@ def gallery(
     return figure
 
 
-def place(figure: Figure, left: float, top: float, width: float, height: float) -> Axes:
+def place(figure: Figure, left: Pixels, top: Pixels, width: Pixels, height: Pixels) -> Axes:
     """Add axes at a place given in pixels from the upper left corner."""
-    full_width, full_height = figure.get_size_inches() * _DPI
-    return figure.add_axes(
-        (left / full_width, 1 - (top + height) / full_height, width / full_width, height / full_height)
-    )
+    across, down = figure.get_size_inches() * _DPI
+    return figure.add_axes((left / across, 1 - (top + height) / down, width / across, height / down))
 
 
-def colour_bar(figure: Figure, scale: Scale, left: float, top: float, height: float) -> None:
+def colour_bar(figure: Figure, scale: Scale, left: Pixels, top: Pixels, height: Pixels) -> None:
     """Add the bar that explains colours; what is off the scale has its last colour."""
     axes = place(figure, left, top, 14, height)
     bar = figure.colorbar(ScalarMappable(Normalize(0, scale.highest), scale.colours), cax=axes, extend="max")
@@ -142,7 +135,7 @@ def save(path: Path, figure: Figure) -> None:
         figure.savefig(temporary, format="png", metadata={"Software": None})
 
 
-def _write(figure: Figure, x: float, y: float, text: str, size: int, colour: str, rotation: float = 0) -> None:
+def _write(figure: Figure, x: Pixels, y: Pixels, text: str, size: int, colour: str, rotation: int = 0) -> None:
     width, height = figure.get_size_inches() * _DPI
     figure.text(
         x / width, 1 - y / height, text, ha="center", va="center", fontsize=size, color=colour, rotation=rotation

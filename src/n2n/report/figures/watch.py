@@ -14,7 +14,7 @@ from n2n.errors import ConfigError
 from n2n.fitting.assemble import build_field, build_objective, build_optimizer
 from n2n.fitting.callbacks import Report
 from n2n.fitting.fit import pick_device
-from n2n.fitting.objective import Block, Objective
+from n2n.fitting.objective import Block
 from n2n.fitting.prepare import fill_config, prepare
 from n2n.tasks.field import Field
 
@@ -81,6 +81,7 @@ def watch(
     starts = range(0, iterations, reuse)
     wanted = [iterations if share >= 1 else round(share * (len(starts) - 1)) * reuse for share in shares]
     data.configure_draws(config["pairs"], config["batch_size"], seed, 0, reuse)
+    frame = data.frames[0]
     moments, targets = {}, np.empty((0, *queries.shape))
 
     def look(iteration: int) -> None:
@@ -92,44 +93,20 @@ def watch(
             look(start)
         generator = torch.Generator().manual_seed(seed * 1_000_003 + start)
         block = objective.begin(sdf, data.transfer_batch_to_device(draw, device, 0), generator, start / iterations)
-        pulled = Field(sdf, data.frames, config).denoise(queries)
-        targets = np.concatenate(
-            [targets, data.frames[0].to_world(_matched(block, data.frames[0].to_unit(pulled)))[None]]
-        )
-        _steps(
-            sdf,
-            objective,
-            block,
-            optimizer,
-            scheduler,
-            range(start, min(start + reuse, iterations)),
-            iterations,
-            generator,
-        )
+        pulled = frame.to_unit(Field(sdf, data.frames, config).denoise(queries))
+        targets = np.concatenate([targets, frame.to_world(_matched(block, pulled))[None]])
+        end = min(start + reuse, iterations)
+        for iteration in range(start, end):
+            optimizer.zero_grad()
+            with sdf.shared():
+                loss, _ = objective.loss(sdf, block, iteration / iterations, generator)
+                loss.backward()
+            optimizer.step()
+            scheduler.step()
         if report:
-            report(min(start + reuse, iterations), iterations, {})
+            report(end, iterations, {})
     look(iterations)
     return [moments[iteration] for iteration in wanted]
-
-
-def _steps(
-    sdf: Any,
-    objective: Objective,
-    block: Block,
-    optimizer: Any,
-    scheduler: Any,
-    steps: range,
-    iterations: int,
-    generator: torch.Generator,
-) -> None:
-    """Do the optimiser steps that share one matching."""
-    for iteration in steps:
-        optimizer.zero_grad()
-        with sdf.shared():
-            loss, _ = objective.loss(sdf, block, iteration / iterations, generator)
-            loss.backward()
-        optimizer.step()
-        scheduler.step()
 
 
 def _matched(block: Block, pulled: NDArray[np.float64]) -> NDArray[np.float64]:

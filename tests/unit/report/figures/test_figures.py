@@ -12,7 +12,7 @@ from n2n.report.figures.request import Subject, read_request
 from n2n.report.figures.slices import Slice
 from n2n.report.figures.style import ERROR, Panel, Scale, gallery, save
 
-TINY = ["shape=sphere", "points=600", "size=80", "iterations=2", "plan_reuse=1"]
+TINY = ["shape=sphere", "points=400", "size=80", "resolution=24", "iterations=2", "plan_reuse=1"]
 
 
 def picture(path):
