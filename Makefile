@@ -1,6 +1,7 @@
 # Everything a fresh machine needs: Python 3.11 or newer and make. `make help` lists the targets.
 VENV ?= .venv
 N2N_DATA ?= ../shared/data
+PROFILE ?= smoke
 TORCH_VERSION := 2.13.0
 
 BIN := $(VENV)/bin
@@ -10,10 +11,10 @@ CPU_INDEX := https://download.pytorch.org/whl/cpu
 PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3.14 python3 python; do \
 	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && { echo $$p; break; }; done)
 
-.PHONY: help setup demo test check format bench bench-docs clean FORCE
+.PHONY: help setup demo test check format bench bench-docs reproduce-tables clean FORCE
 
 help:  ## this list
-	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
 	@echo
 	@echo "NVIDIA GPU: make setup TORCH=torch     (without TORCH a CPU build is installed, no CUDA packages)"
 
@@ -39,6 +40,11 @@ bench: $(STAMP)  ## measure everything, about 15 minutes; BENCH="matching step" 
 
 bench-docs: $(STAMP)  ## copy the report of `make bench` to docs/benchmarks.md
 	@$(BIN)/python -m benchmarks --docs
+
+# What smoke measures means nothing, so it is not kept with the results.
+RESULTS = $(if $(filter smoke,$(PROFILE)),out/tables/smoke/results,results/$(PROFILE))
+reproduce-tables: $(STAMP)  ## the paper's tables, in out/tables; PROFILE=smoke (minutes), laptop (hours) or paper (a cluster)
+	@N2N_DATA="$(N2N_DATA)" $(BIN)/n2n tables run --profile $(PROFILE) --results $(RESULTS)
 
 clean:  ## remove .venv and caches, keep results
 	rm -rf $(VENV) .pytest_cache .ruff_cache .import_linter_cache .hypothesis

@@ -4,10 +4,13 @@ Each `check_*` builds small problems, asks the component and raises `ContractErr
 needed: `check_distance(MyDistance())` inside a test function is enough.
 """
 
-from collections.abc import Callable
+import pickle
+from collections.abc import Callable, Sequence
 from typing import Any
 
+import numpy as np
 import torch
+import trimesh
 from torch import Tensor
 
 from n2n.architectures.base import SDF
@@ -19,7 +22,7 @@ class ContractError(AssertionError):
     """A component breaks a promise the rest of n2n relies on."""
 
 
-def require(promise: str, kept: bool | Tensor) -> None:
+def require(promise: str, kept: bool | np.bool_ | Tensor) -> None:
     """Raise `ContractError` unless the promise is kept."""
     if not bool(kept):
         raise ContractError(f"broken promise: {promise}")
@@ -141,6 +144,66 @@ def check_pairing(build: Callable[..., Any], seed: int = 0) -> None:
         require("same=True draws leaves of the same shape", tied[0].shape == tied[1].shape and tied[0].ndim == 2)
 
 
+def check_metric(metric: Any, shapes: Sequence[tuple[Any, ...]]) -> None:
+    """Check a metric, which is a `torchmetrics.Metric`.
+
+    Args:
+        metric: Fresh; is left fresh.
+        shapes: Arguments of `update` for two shapes or more, as arrays.
+    """
+    before = [[np.array(array) for array in arrays] for arrays in shapes]
+    alone = []
+    for arrays in shapes:
+        metric.reset()
+        value = _numbers(metric(*arrays))
+        require("calling it measures one shape", torch.equal(value, _numbers(metric.compute())))
+        alone.append(value)
+    metric.reset()
+    for arrays in shapes:
+        metric.update(*(torch.as_tensor(np.asarray(array)) for array in arrays))
+    mean = _numbers(metric.compute())
+    require("the values are finite", mean.isfinite().all())
+    require("it is the mean over shapes, of arrays and tensors alike", torch.allclose(mean, torch.stack(alone).mean(0)))
+    copy = pickle.loads(pickle.dumps(metric))
+    require("a pickled metric knows what it has seen", torch.equal(_numbers(copy.compute()), mean))
+    metric.reset()
+    require("reset forgets", torch.equal(_numbers(metric(*shapes[0])), alone[0]))
+    metric.reset()
+    same = all(
+        np.array_equal(a, b) for old, new in zip(before, shapes, strict=True) for a, b in zip(old, new, strict=True)
+    )
+    require("its arguments are not changed", same)
+
+
+def check_baseline(method: Any, seed: int = 0) -> None:
+    """Check another method: `denoise(points)`, `reconstruct(points)` or both, in world coordinates.
+
+    Args:
+        method: Constructed.
+        seed: Of the points.
+    """
+    random = np.random.default_rng(seed)
+    directions = random.normal(size=(2000, 3))
+    sphere = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    centre, radius = np.array([500.0, -200.0, 100.0]), 20.0
+    points = centre + radius * (sphere + 0.01 * random.normal(size=sphere.shape))
+    given = points.copy()
+    require("it can denoise or reconstruct", hasattr(method, "denoise") or hasattr(method, "reconstruct"))
+    if hasattr(method, "denoise"):
+        clean = method.denoise(points)
+        require("denoise keeps number and order of the points, float64", _is_cloud(clean, len(points)))
+        require("no point moves far", np.linalg.norm(clean - given, axis=1).max() < 0.5 * radius)
+        require("equal points give equal points", np.array_equal(method.denoise(points), clean))
+    if hasattr(method, "reconstruct"):
+        mesh = method.reconstruct(points)
+        require("reconstruct returns a mesh with faces", isinstance(mesh, trimesh.Trimesh) and len(mesh.faces) > 0)
+        require("its vertices are finite", np.isfinite(mesh.vertices).all())
+        require(
+            "the mesh lies where the points do", np.abs(mesh.bounds - [centre - radius, centre + radius]).max() < radius
+        )
+    require("the points given are not changed", np.array_equal(points, given))
+
+
 class Ball(SDF):
     """The exact distance to a sphere with a learnable centre and radius: a field whose answers are known."""
 
@@ -185,3 +248,12 @@ def example_state(seed: int = 0, complete: bool = True) -> FieldState:
 
 def _tensors(plan: Any) -> list[Tensor]:
     return [plan] if isinstance(plan, Tensor) else [t for t in plan if isinstance(t, Tensor)]
+
+
+def _numbers(value: Any) -> Tensor:
+    values = list(value.values()) if isinstance(value, dict) else [value]
+    return torch.stack([torch.as_tensor(number, dtype=torch.float64) for number in values])
+
+
+def _is_cloud(points: Any, count: int) -> bool:
+    return points.shape == (count, 3) and points.dtype == np.float64 and bool(np.isfinite(points).all())

@@ -6,7 +6,8 @@ from n2n import registry
 from n2n.compose import compose, conf_dir
 from n2n.errors import ConfigError
 
-GROUPS = sorted(folder.name for folder in conf_dir().iterdir() if folder.is_dir() and folder.name != "setting")
+NOT_OF_A_FIT = {"setting", "table", "profile", "protocol"}
+GROUPS = sorted(folder.name for folder in conf_dir().iterdir() if folder.is_dir() and folder.name not in NOT_OF_A_FIT)
 OPTIONS = [(group, option.stem) for group in GROUPS for option in sorted((conf_dir() / group).glob("*.yaml"))]
 NEEDS = {("datamodule", "files"): ["datamodule.paths=[a.ply,b.ply]"]}
 

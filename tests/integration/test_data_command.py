@@ -15,6 +15,7 @@ from n2n.cli import fetch
 from n2n.cli.main import main
 from n2n.datamodules import catalog
 from n2n.datamodules.catalog import DATASETS, Link, dataset
+from n2n.datamodules.pointcleannet import PCDataModule
 from n2n.datamodules.punet import PUDataModule
 from n2n.registry import DATAMODULES
 from tests.unit.datamodules.server import Site, serve
@@ -142,6 +143,55 @@ def test_a_complete_dataset_is_left_alone(n2n, tmp_path):
     assert code == 0 and "nothing to do" in output
 
 
+def scene(root, name, truth):
+    for folder, is_here in (("input", True), ("ground_truth", truth)):
+        path = root / f"data/3dscene/{folder}/{name}{'_1000' if folder == 'input' else ''}.ply"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if is_here:
+            trimesh.creation.icosphere(3).export(path)
+
+
+def test_scans_without_their_truth_are_not_all_there_is(n2n, tmp_path):
+    scene(tmp_path, "lounge", True)
+    scene(tmp_path, "copyroom", False)
+    assert row(n2n("list")[1], "scene3d").split()[1] == "partial"
+    code, output, _ = n2n("fetch", "scene3d")
+    assert code == 1 and "nothing to do" not in output and "(1 with truth)" in output and "  1. open http" in output
+    scene(tmp_path, "copyroom", True)
+    code, output, _ = n2n("fetch", "scene3d")
+    assert code == 0 and "nothing to do" in output
+
+
+def test_what_brings_no_truth_is_not_downloaded_for_it(n2n, tmp_path, monkeypatch):
+    """All scans of SRB are here; only the ground truth is to be got, by hand."""
+    for name in ("anchor", "daratech", "dc", "gargoyle", "lord_quas"):
+        path = tmp_path / f"data/srb/scans/{name}.ply"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        trimesh.PointCloud(ball()).export(path)
+    monkeypatch.setattr(fetch, "download", lambda *_: pytest.fail("downloaded"))
+    code, output, _ = n2n("fetch", "srb")
+    assert code == 1 and "srb: partial, 5 of 5 (0 with truth)" in output and "dense ground truth" in output
+
+
+def test_an_archive_may_unpack_to_a_folder_of_its_own_name(n2n, monkeypatch, tmp_path):
+    content = {name: io.BytesIO() for name in ("clouds", "meshes")}
+    with zipfile.ZipFile(content["clouds"], "w") as archive:
+        text = "".join(f"{x:.5f} {y:.5f} {z:.5f}\n" for x, y, z in ball(100_000))
+        archive.writestr("pointCleanNetDataset/galera100k.xyz", text)
+    with zipfile.ZipFile(content["meshes"], "w") as archive:
+        archive.writestr("all/galera.off", trimesh.creation.icosphere(4, 0.5).export(file_type="off"))
+    entry = dataset("pc")
+    with serve(Site(**{name: data.getvalue() for name, data in content.items()})) as running:
+        links = [link._replace(url=f"{running.url}/{name}") for name, link in zip(content, entry.links, strict=True)]
+        changed = catalog.Dataset(**{**entry.__dict__, "links": tuple(links)})
+        monkeypatch.setattr(fetch, "dataset", lambda name: changed)
+        code, output, error = n2n("fetch", "pc")
+    assert code == 0, error
+    assert "clean 1 of 10" in output and "meshes 1 of 10" in output
+    data = PCDataModule(points=500)
+    assert data.name == "galera" and len(data.reference.faces) == 5120
+
+
 def test_verify_names_every_bad_file_and_reads_the_rest(n2n, site, tmp_path):
     n2n("fetch", "famous")
     folder = tmp_path / "data/famous_original"
@@ -208,14 +258,45 @@ def test_prepare_writes_exact_counts_that_the_data_module_reads(n2n, tmp_path, m
     np.testing.assert_allclose(unit, drawn.noisy, atol=1e-7)
 
 
-def test_prepare_thins_the_clouds_of_pc(n2n, tmp_path):
-    folder = tmp_path / "data/PCNet"
+@pytest.mark.parametrize("place", ["PCNet", "pointCleanNetDataset"])
+def test_prepare_thins_the_clouds_of_pc(n2n, tmp_path, monkeypatch, place):
+    folder = tmp_path / "data" / place
     folder.mkdir(parents=True)
     points = ball(100_000)
     np.savetxt(folder / "happy100k.xyz", points, fmt="%.7f")
-    code, _, error = n2n("prepare", "pc", "--points", 500, "--noise", "0.01")
-    assert code == 0, error
-    chosen = np.loadtxt(tmp_path / "data/PCNet/pointclouds/test/500_poisson/happy.xyz")
-    stored = {tuple(point) for point in np.round(points, 7)}
-    assert chosen.shape == (500, 3) and all(tuple(point) in stored for point in np.round(chosen, 7))
-    assert (tmp_path / "data/examples/PCNet_500_poisson_0.01/happy.xyz").exists()
+    np.savetxt(folder / "happy100k_noise_white_1.00e-02.xyz", points + 0.01 * ball(100_000, 1), fmt="%.7f")
+    drawn = PCDataModule("happy", points=500, noise=0.02, seed=3)
+    for output in ("out", "data"):
+        told = [] if output == "data" else ["-o", output]
+        code, _, error = n2n("prepare", "pc", "--points", 500, "--noise", "0.01", "0.02", "--seed", 3, *told)
+        assert code == 0, error
+        chosen = np.loadtxt(tmp_path / output / "PCNet/pointclouds/test/500_poisson/happy.xyz")
+        stored = {tuple(point) for point in np.round(points, 7)}
+        assert chosen.shape == (500, 3) and all(tuple(point) in stored for point in np.round(chosen, 7))
+        # What was written is read again, and hides nothing.
+        read = PCDataModule("happy", points=500, noise=0.02, seed=3, official=True, root=output)
+        np.testing.assert_allclose(read.noisy, drawn.noisy, atol=1e-6)
+        assert "happy.xyz (made by n2n data prepare)" in read.source
+    assert row(n2n("list")[1], "pc").split()[2:6] == ["clean", "1", "of", "10;"]
+    assert "happy100k.xyz, 600 of" in PCDataModule("happy", points=600).source
+    # The benchmark's own noise goes before what was made here.
+    assert "happy100k_noise_white" in PCDataModule("happy", points=500, official=True).source
+
+
+def test_prepare_knows_what_it_made_and_leaves_the_rest_alone(n2n, tmp_path):
+    mesh = tmp_path / "data/data/PUNet/meshes/test/duck.off"
+    mesh.parent.mkdir(parents=True)
+    trimesh.creation.torus(1.0, 0.4).export(mesh)
+    arguments = ("prepare", "pu", "--noise", "0.01", "--points")
+    official = tmp_path / "data/data/PUNet/pointclouds/test/300_poisson/duck.xyz"
+    official.parent.mkdir(parents=True)
+    official.write_text("0 0 0\n")
+    code, output, _ = n2n(*arguments, 300)
+    assert code == 2 and "not made by this command; write to another folder" in row(output, "BAD")
+    assert official.read_text() == "0 0 0\n"
+    assert n2n(*arguments, 400)[0] == n2n(*arguments, 500)[0] == n2n(*arguments, 400, 500)[0] == 0
+    assert n2n(*arguments, 500)[0] == 0
+    assert (official.parents[1] / "400_poisson/duck.xyz").exists()
+    for count in (400, 500):
+        source = PUDataModule(points=count, official=True).source
+        assert source.count("(made by n2n data prepare)") == 2

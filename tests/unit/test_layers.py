@@ -41,7 +41,9 @@ def test_the_contract_would_notice(tmp_path):
     assert result.returncode != 0 and "upside.low" in result.stdout
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["list"], ["denoise", "--help"], ["fit", "--help"], ["--version"]])
+@pytest.mark.parametrize(
+    "arguments", [["--help"], ["list"], ["denoise", "--help"], ["fit", "--help"], ["tables", "--help"], ["--version"]]
+)
 def test_help_and_list_stay_light(arguments):
     code = (
         "import sys\nfrom n2n.cli.main import main\n"

@@ -31,8 +31,14 @@ def state(parts: Sequence[Part]) -> str:
     if not any(part.scans for part in parts):
         return "missing"
     needed = [part for part in parts if not part.optional]
-    whole = all(part.scans and len(part.scans) >= (part.expected or 1) for part in needed)
+    whole = has_scans(parts) and not any(part.with_truth and _truths(part) < len(part.scans) for part in needed)
     return "present" if whole else "partial"
+
+
+def has_scans(parts: Sequence[Part]) -> bool:
+    """Tell whether all scans are here, with or without their ground truth."""
+    needed = [part for part in parts if not part.optional]
+    return all(part.scans and len(part.scans) >= (part.expected or 1) for part in needed)
 
 
 def summary(parts: Sequence[Part]) -> str:
@@ -105,9 +111,13 @@ def _read(scan) -> str | None:
 
 def _count(part: Part, named: bool) -> str:
     of = f" of {part.expected}" if part.expected and len(part.scans) <= part.expected else ""
-    truths = sum(scan.truth is not None and scan.truth.is_file() for scan in part.scans)
+    truths = _truths(part)
     with_truth = f" ({truths} with truth)" if part.with_truth and truths < len(part.scans) else ""
     return f"{part.label + ' ' if named else ''}{len(part.scans)}{of}{with_truth}"
+
+
+def _truths(part: Part) -> int:
+    return sum(scan.truth is not None and scan.truth.is_file() for scan in part.scans)
 
 
 def _folder(parts: Sequence[Part]) -> str:

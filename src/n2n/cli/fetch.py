@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from n2n.cli.console import progress_bar, say
-from n2n.cli.datasets import describe, output_folder, state
+from n2n.cli.datasets import describe, has_scans, output_folder, state
 from n2n.datamodules.catalog import Dataset, Link, dataset
 from n2n.datamodules.download import download
 from n2n.datamodules.layouts import data_folder
@@ -19,24 +19,26 @@ def fetch(name: str, output: str | None) -> int:
         0: something was downloaded, or all of it is here already; 1: all of it has to be got by hand.
     """
     entry, folder = dataset(name), data_folder(output)
-    if state(entry.find(folder)) == "present":
-        print(f"{describe(entry, entry.find(folder))}: nothing to do")
+    parts = entry.find(folder)
+    if state(parts) == "present":
+        print(f"{describe(entry, parts)}: nothing to do")
         return DONE
     print(f"{entry.title}\nlicence: {entry.licence}", flush=True)
-    if entry.links:
+    links = [link for link in entry.links if link.brings_truth or not has_scans(parts)]
+    if links:
         output_folder(output)
-    for link in entry.links:
+    for link in links:
         _get(link, folder)
-    if entry.links:
+    if links or any(part.scans for part in parts):
         _report(entry, folder)
     if entry.steps:
-        print(f"{'for the rest' if entry.links else 'to be got by hand'}:")
+        print(f"{'for the rest' if links else 'to be got by hand'}:")
         for number, step in enumerate(entry.steps, 1):
             print(f"  {number}. {step.format(folder=folder)}")
         print(f"the folders must look like: {entry.layout}")
     if folder != data_folder():
         print(f"set N2N_DATA={folder} to use it")
-    return DONE if entry.links else BY_HAND
+    return DONE if links else BY_HAND
 
 
 def _get(link: Link, folder: Path) -> None:

@@ -1,12 +1,10 @@
 """Shapes of benchmarks: observations together with what is known of the true surface."""
 
 from collections.abc import Iterable
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from n2n.datamodules.layouts import data_folder
 from n2n.datamodules.observations import ObservationsDataModule
 from n2n.errors import InputError
 from n2n.geometry.noise import add_noise, check_model
@@ -106,14 +104,3 @@ def is_missing(absent: Iterable[str], what: str, where: str) -> str | None:
         return None
     shown = ", ".join(absent[:20]) + (f", ... ({len(absent)} in all)" if len(absent) > 20 else "")
     return f"{what} not present: {shown}; {where}"
-
-
-def shown(path: Path, root: str | None) -> str:
-    """Return how a file is named in `source`: below the data folder, the same on every machine.
-
-    Files that were made here are not the benchmark's own, although they lie in its places.
-    """
-    folder = data_folder(root)
-    name = (path.relative_to(folder) if path.is_relative_to(folder) else path).as_posix()
-    made = any(f'"{name}"' in record.read_text() for record in folder.glob("n2n-prepared-*.json"))
-    return f"{name} (made by n2n data prepare)" if made else name

@@ -23,12 +23,14 @@ class Link(NamedTuple):
         file: What to call it here.
         folder: Where it unpacks to, below the data folder.
         note: What it is.
+        brings_truth: Whether it brings all there is; False: the scans without their ground truth.
     """
 
     url: str
     file: str
     folder: str
     note: str
+    brings_truth: bool = True
 
 
 @dataclass(frozen=True)
@@ -77,11 +79,14 @@ DATASETS = (
         "pc",
         "PointCleanNet test shapes: 10 clouds of 100,000 points, without and with noise",
         "research use; cite PointCleanNet (Rakotosaona et al. 2020)",
-        "PCNet/NAME100k.xyz, PCNet/NAME100k_noise_white_{5.00e-03,1.00e-02,2.50e-02}.xyz, PCNet/validationset.txt",
+        "PCNet/NAME100k.xyz, PCNet/NAME100k_noise_white_{2.50e-03,5.00e-03,1.00e-02,1.50e-02,2.50e-02}.xyz (or "
+        "pointCleanNetDataset/...), PCNet/meshes/NAME.off; or as pu, with PCNet in place of PUNet",
         clean_layouts.pcnet,
         (
-            Link(f"{_NUAGE}3ZcFtqKm6Z27ZJ6/download", "pointCleanNetDataset", "", "clouds of the denoising task"),
-            Link(f"{_NUAGE}9CrHe259zaJEMb8/download", "pointCleanNetMeshes", "PCNet/meshes", "meshes, for P2M"),
+            Link(
+                f"{_NUAGE}3ZcFtqKm6Z27ZJ6/download", "pointCleanNetDataset.archive", "", "clouds of the denoising task"
+            ),
+            Link(f"{_NUAGE}9CrHe259zaJEMb8/download", "pointCleanNetMeshes.archive", "PCNet/meshes", "meshes, for P2M"),
         ),
     ),
     Dataset(
@@ -114,10 +119,19 @@ DATASETS = (
         "MPI licence: non-commercial research, registration at dfaust.is.tue.mpg.de",
         "dfaust/NAME.ply (SAP) or dfaust/scans/SUBJECT/ACTION/ACTION.FRAME.ply (raw), dfaust/ground_truth/NAME.ply",
         lambda root: [layouts.dfaust(root)],
-        (Link(f"{_AVG}shape_as_points/data/optim_data.zip", "optim_data.zip", "", "the selection of SAP, 200 MB"),),
+        (
+            Link(
+                f"{_AVG}shape_as_points/data/optim_data.zip",
+                "optim_data.zip",
+                "",
+                "the selection of SAP, 200 MB",
+                False,
+            ),
+        ),
         (
             "raw scans: register at http://dfaust.is.tue.mpg.de and accept the licence",
             "download the scans and unpack them so that {folder}/dfaust/scans/50002/ACTION/ACTION.000001.ply exists",
+            "ground truth comes with neither: put a clean mesh of each scan at {folder}/dfaust/ground_truth/NAME.ply",
         ),
     ),
     Dataset(
@@ -126,7 +140,7 @@ DATASETS = (
         "research use; cite Berger et al. 2013 and Williams et al. 2019 (Deep Geometric Prior)",
         "srb/scans/NAME.ply, srb/ground_truth/NAME.xyz (or deep_geometric_prior_data/...)",
         lambda root: [layouts.srb(root)],
-        (Link(f"{_AVG}shape_as_points/data/optim_data.zip", "optim_data.zip", "", "the copy of SAP, 200 MB"),),
+        (Link(f"{_AVG}shape_as_points/data/optim_data.zip", "optim_data.zip", "", "the copy of SAP, 200 MB", False),),
         (
             "dense ground truth: https://drive.google.com/file/d/1PVzQ-kTrQwkEqwQg3weSMMlpx2RLRrUq/view (1.12 GB)",
             "unpack it in {folder}: it brings deep_geometric_prior_data/{{scans,ground_truth}}",

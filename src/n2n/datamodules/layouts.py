@@ -13,6 +13,7 @@ _LISTS = ("testset.txt", "valset.txt", "trainset.txt")  # the sets for testing h
 _TRUTHS = (".ply", ".xyz", ".obj", ".off")
 SRB_SHAPES = ("anchor", "daratech", "dc", "gargoyle", "lord_quas")
 SCENES = ("lounge", "copyroom")  # of the paper; others may lie beside them
+_RAW = "500[0-9][0-9]/*/*.ply"  # subjects of D-FAUST
 STREETS = ("GT_Madame1_2", "GT_Madame1_3")
 FAMOUS = tuple(f"famous_{variant}" for variant in ("original", "noisefree", "dense", "sparse", "extra_noisy"))
 ABC = ("abc", "abc_noisefree", "abc_extra_noisy", "abc_minimal")
@@ -113,16 +114,15 @@ def points2surf(root: Path, variant: str) -> Part:
 
 
 def dfaust(root: Path) -> Part:
-    """Find the selection of SAP, `dfaust/NAME.ply`, else raw scans, `scans/SUBJECT/ACTION/ACTION.FRAME.ply`."""
+    """Find the selection of SAP, `dfaust/NAME.ply`, else raw, `[dfaust/]scans/SUBJECT/ACTION/ACTION.FRAME.ply`."""
     folder = folder_of(root, "dfaust", "DFAUST", "D-FAUST")
     layout = "dfaust/NAME.ply or dfaust/scans/SUBJECT/ACTION/ACTION.FRAME.ply, truth in dfaust/ground_truth/NAME.ply"
-    raw = folder / "scans"
-    paths = sorted(folder.glob("*.ply")) or sorted(raw.glob("*/*/*.ply"))
-    top = raw if paths and paths[0].is_relative_to(raw) else folder
+    places = [(folder, "*.ply"), (folder / "scans", _RAW), (folder_of(root, "scans"), _RAW)]
+    top, paths = next(((top, found) for top, ending in places if (found := sorted(top.glob(ending)))), (folder, []))
     names = [path.relative_to(top).as_posix().removesuffix(".ply") for path in paths]
     truths = [folder / "ground_truth", folder]
     scans = [Scan(name, path, _truth(truths, [name], path), layout) for name, path in zip(names, paths, strict=True)]
-    return Part("dfaust", folder, tuple(scans), 5, with_truth=True)
+    return Part("dfaust", top, tuple(scans), 5, with_truth=True)
 
 
 def srb(root: Path) -> Part:
@@ -221,6 +221,15 @@ def folder_of(root: Path, *names: str) -> Path:
     """Return the first of the named folders that exists below the root; if none does, the first one's usual place."""
     places = [root / base / name for base in _BASES for name in names]
     return next((place for place in places if place.is_dir()), places[0])
+
+
+def folder_with(root: Path, pattern: str, *names: str) -> Path:
+    """Return the first of the named folders that holds something of that pattern; if none does, as `folder_of`.
+
+    One benchmark's files may come in several archives, which unpack beside each other.
+    """
+    places = [root / base / name for base in _BASES for name in names]
+    return next((place for place in places if any(place.glob(pattern))), folder_of(root, *names))
 
 
 def _truth(folders: Iterable[Path], names: Iterable[str], scan: Path) -> Path | None:

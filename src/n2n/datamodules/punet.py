@@ -1,24 +1,21 @@
 """The PU-Net test shapes, as score-denoise set them up."""
 
-import numpy as np
-from numpy.typing import NDArray
-
-from n2n.datamodules.benchmark import BenchmarkDataModule, check_count, is_missing, noisy_copies, shown
+from n2n.datamodules.benchmark import BenchmarkDataModule, check_count, is_missing, noisy_copies
 from n2n.datamodules.catalog import dataset
-from n2n.datamodules.clean import read_official, read_rows
-from n2n.datamodules.clean_layouts import PU_SHAPES, punet
-from n2n.datamodules.layouts import Scan, data_folder, pick
+from n2n.datamodules.clean import clean_cloud, in_unit, read_official
+from n2n.datamodules.clean_layouts import PU_SHAPES, is_clean, punet, together
+from n2n.datamodules.layouts import Part, data_folder, pick
+from n2n.datamodules.origin import shown
 from n2n.datamodules.reading import read_scan
 from n2n.geometry.checks import MIN_POINTS
 from n2n.geometry.frame import Frame
-from n2n.geometry.poisson import poisson_disk
-from n2n.geometry.reference import Reference
 
 
 class PUDataModule(BenchmarkDataModule):
     """A PU-Net test shape: Poisson-disk points in the unit sphere of the clean cloud, noise added.
 
-    The clean cloud is the official file where there is one of that many points, else it is sampled from the mesh.
+    The clean cloud is the official file where there is one of that many points, else it is sampled from the mesh. A
+    shape without a mesh has its clean clouds, and what is thinned from them, as reference: no P2M.
 
     Args:
         shape: One of the 20 names; None takes the first that is present.
@@ -48,41 +45,39 @@ class PUDataModule(BenchmarkDataModule):
     ) -> None:
         check_count("points", points, MIN_POINTS)
         check_count("reference_points", reference_points, MIN_POINTS)
-        parts = {part.label: part for part in punet(data_folder(root))}
-        mesh = pick(parts["meshes"], shape, dataset("pu").how())
-        files = {label: scan for label, part in parts.items() for scan in part.scans if scan.name == mesh.name}
-        truth = read_scan(mesh)[1]
-        world, told = _clean(mesh, files, truth, points, seed, root)
+        parts = punet(data_folder(root))
+        name = pick(_known(parts), shape, dataset("pu").how()).name
+        files = {part.label: scan for part in parts for scan in part.scans if scan.name == name}
+        truth = read_scan(files["meshes"])[1] if "meshes" in files else None
+        world, told = clean_cloud(files, points, seed, root, truth)
         frame = Frame.fit([world])
         clean = frame.to_unit(world)
         copies = noisy_copies(clean, noise, noise_model, seed, num_observations)
         if official:
             wanted = f"{points}_poisson_{noise:g}"
-            copies[0] = frame.to_unit(read_official(files.get(wanted), f"{mesh.name}, {wanted}"))
+            copies[0] = frame.to_unit(read_official(files.get(wanted), f"{name}, {wanted}"))
             told += f"; first observation {shown(files[wanted].path, root)}, others"
         told += f"; {noise_model} noise {noise:g} of the radius, seed {seed}"
         if reference_points not in (None, points):
-            dense, how = _clean(mesh, files, truth, reference_points, seed, root)
+            dense, how = clean_cloud(files, reference_points, seed, root, truth)
             clean, told = frame.to_unit(dense), f"{told}; reference {how}"
-        reference = Reference(points=clean, vertices=frame.to_unit(truth.vertices), faces=truth.faces)
-        super().__init__(mesh.name, copies, reference, told, num_observations)
+        if truth is None:
+            told += "; there is no mesh"
+        super().__init__(name, copies, in_unit(frame, clean, truth), told, num_observations)
 
     @classmethod
     def names(cls, root: str | None = None) -> list[str]:
-        return [scan.name for scan in punet(data_folder(root))[0].scans]
+        return [scan.name for scan in _known(punet(data_folder(root))).scans]
 
     @classmethod
     def missing(cls, root: str | None = None) -> str | None:
-        present = cls.names(root)
-        return is_missing([name for name in PU_SHAPES if name not in present], "PU meshes", dataset("pu").how())
+        parts, how = punet(data_folder(root)), dataset("pu").how()
+        present = [scan.name for scan in _known(parts).scans]
+        bare = [name for name in present if name in parts[0].absent]
+        lines = is_missing([name for name in PU_SHAPES if name not in present], "PU meshes", how)
+        return "; ".join(filter(None, [lines, is_missing(bare, "PU meshes, for P2M,", how)])) or None
 
 
-def _clean(
-    mesh: Scan, files: dict[str, Scan], truth: Reference, points: int, seed: int, root: str | None
-) -> tuple[NDArray[np.float64], str]:
-    """Return the clean cloud in the coordinates of the mesh, (points, 3), and where it comes from."""
-    scan = files.get(f"{points}_poisson")
-    if scan is None:
-        cloud = poisson_disk(truth.vertices, truth.faces, points, seed)
-        return cloud, f"{shown(mesh.path, root)}, {points} Poisson-disk points, seed {seed}"
-    return read_rows(scan), shown(scan.path, root)
+def _known(parts: list[Part]) -> Part:
+    """Return the shapes of which there is a mesh or a clean cloud."""
+    return together([parts[0], *(part for part in parts if is_clean(part.label))], PU_SHAPES)

@@ -6,17 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from n2n.datamodules.layouts import Scan
-from n2n.datamodules.registration import similarity
+from n2n.datamodules.registration import extent, is_moved, middle, positions, same_frame, similarity
 from n2n.errors import InputError, N2NError
 from n2n.formats import read_cloud
 from n2n.geometry.checks import check_cloud
 from n2n.geometry.reference import Reference
 
 _MESHES = (".ply", ".obj", ".off")
-# How much of the distance a change of frame may explain: 1.2 with noise of 5 % of the longest edge, 12 seen where the
-# scales were mixed.
-_UNDONE = 2.5
-_RATIO = 2.0  # of the extents of scan and truth; sensor noise and what a scan does not reach stay far below
 
 
 def read_scan(scan: Scan) -> tuple[NDArray[np.float64], Reference]:
@@ -35,8 +31,8 @@ def read_scan(scan: Scan) -> tuple[NDArray[np.float64], Reference]:
                 raise InputError(f"{scan.path}: holds no triangles")
             return reference.vertices, reference
         points = read_points(scan.path, scan.columns, scan.count)
-        if scan.largest is not None and not _extent(points) < scan.largest:
-            raise InputError(f"{scan.path}: the longest edge is {_extent(points):.3g}, not below {scan.largest}")
+        if scan.largest is not None and not extent(points) < scan.largest:
+            raise InputError(f"{scan.path}: the longest edge is {extent(points):.3g}, not below {scan.largest}")
         reference = Reference() if scan.truth is None else read_truth(scan.truth)
     except N2NError as error:
         raise InputError(f"{error}; expected {scan.layout}") from error
@@ -44,8 +40,8 @@ def read_scan(scan: Scan) -> tuple[NDArray[np.float64], Reference]:
         points = _out_of_unit_box(points, reference)
     if not same_frame(points, reference):
         raise InputError(
-            f"{scan.path}: does not lie where its truth {scan.truth} lies (longest edges {_extent(points):.3g} and "
-            f"{_extent(_positions(reference)):.3g}); expected both in one frame, {scan.layout}"
+            f"{scan.path}: does not lie where its truth {scan.truth} lies (longest edges {extent(points):.3g} and "
+            f"{extent(positions(reference)):.3g}); expected both in one frame, {scan.layout}"
         )
     if scan.truth is not None:
         _check_registered(scan, points, reference)
@@ -55,7 +51,7 @@ def read_scan(scan: Scan) -> tuple[NDArray[np.float64], Reference]:
 def _check_registered(scan: Scan, points: NDArray[np.float64], reference: Reference) -> None:
     """Refuse a pair that another frame of the scan would fit much better: every error would measure that."""
     fit = similarity(points, reference)
-    if fit.before > _UNDONE * fit.after:
+    if is_moved(fit, reference):
         raise InputError(
             f"{scan.path}: is not in the frame of its truth {scan.truth}: the median distance is {fit.before:.2g}, and "
             f"{fit.after:.2g} after scaling by {fit.scale:.3f} and moving by {fit.shift:.2g}; expected both in one "
@@ -95,36 +91,13 @@ def read_truth(path: Path) -> Reference:
     return Reference(points=cloud.points, normals=_unit(np.stack(normals, axis=1).astype(np.float64)))
 
 
-def same_frame(points: NDArray[np.float64], reference: Reference) -> bool:
-    """Tell whether scan and truth lie at the same place in about the same size."""
-    truth = _positions(reference)
-    if not len(truth):
-        return True
-    ratio = _extent(points) / max(_extent(truth), np.finfo(float).tiny)
-    apart = float(np.abs(_middle(points) - _middle(truth)).max())
-    return bool(1 / _RATIO < ratio < _RATIO and apart < _extent(truth) / 2)
-
-
 def _out_of_unit_box(points: NDArray[np.float64], reference: Reference) -> NDArray[np.float64]:
     """Undo a normalisation by the truth's box, as the evaluation of the benchmark does.
 
     Source: CAP-UDF, evaluation/3dscene/eval_mesh.py.
     """
-    truth = _positions(reference)
-    return points * _extent(truth) + _middle(truth)
-
-
-def _positions(reference: Reference) -> NDArray[np.float64]:
-    known = reference.points if reference.vertices is None else reference.vertices
-    return np.empty((0, 3)) if known is None else known
-
-
-def _extent(points: NDArray[np.float64]) -> float:
-    return float(np.ptp(points, axis=0).max())
-
-
-def _middle(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    return (points.min(axis=0) + points.max(axis=0)) / 2
+    truth = positions(reference)
+    return points * extent(truth) + middle(truth)
 
 
 def _triangles(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

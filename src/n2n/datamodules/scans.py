@@ -2,9 +2,10 @@
 
 from typing import ClassVar
 
-from n2n.datamodules.benchmark import BenchmarkDataModule, is_missing, shown
+from n2n.datamodules.benchmark import BenchmarkDataModule, is_missing
 from n2n.datamodules.catalog import dataset
 from n2n.datamodules.layouts import Part, Scan, absent, pick
+from n2n.datamodules.origin import shown
 from n2n.datamodules.reading import read_scan
 
 

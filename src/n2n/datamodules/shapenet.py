@@ -3,10 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from n2n.datamodules.benchmark import CLEAN, BenchmarkDataModule, check_count, is_missing, noisy_copies, shown
+from n2n.datamodules.benchmark import CLEAN, BenchmarkDataModule, check_count, is_missing, noisy_copies
 from n2n.datamodules.catalog import dataset
 from n2n.datamodules.clean_layouts import shapenet
 from n2n.datamodules.layouts import Part, Scan, data_folder, pick
+from n2n.datamodules.origin import shown
 from n2n.errors import InputError, N2NError
 from n2n.formats import read_cloud
 from n2n.geometry.checks import MIN_POINTS, check_cloud

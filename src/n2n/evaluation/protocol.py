@@ -15,6 +15,7 @@ from n2n.evaluation.floors import FLOORS, measure_floors
 from n2n.evaluation.frames import FRAMES
 from n2n.evaluation.measures import MEASURES
 from n2n.evaluation.options import load_option
+from n2n.evaluation.placement import check_overlap, misplaced
 from n2n.evaluation.samples import SAMPLERS
 from n2n.geometry.reference import Reference
 from n2n.registry import PROTOCOLS, suggest
@@ -104,11 +105,14 @@ class Protocol:
             Raw numbers; what cannot be measured is blank with a reason.
 
         Raises:
-            InputError: Something is empty, not finite or without area.
+            InputError: Something is empty, not finite, without area, or lies wholly beside the reference.
         """
-        for name, points in _points_of(prediction, reference, noisy).items():
+        given = _points_of(prediction, reference, noisy)
+        for name, points in given.items():
             _check(name, points)
         comparison = Comparison(self, reference)
+        for name, points in given.items():
+            check_overlap(name, np.asarray(points), reference)
         measured = comparison.measure(prediction)
         result = Evaluation(self.label, measured.values, measured.blanks)
         result.definitions = {metric: self._definition(metric) for metric in self.metrics}
@@ -116,6 +120,9 @@ class Protocol:
         if comparison.truth is not None:
             result.samples["reference"] = _described(comparison.truth)
         self._remark(result, comparison, isinstance(prediction, trimesh.Trimesh))
+        sampled = {"prediction": measured.samples.points, "noisy cloud": noisy, "reference cloud": reference.points}
+        remarks = (misplaced(name, cloud, reference) for name, cloud in sampled.items() if cloud is not None)
+        result.notes += filter(None, remarks)
         if self.crop is not None:
             self._measure_cropped(result, comparison, prediction, noisy)
         if isinstance(prediction, trimesh.Trimesh):
@@ -207,7 +214,12 @@ def _known(key: str, value: Any, known: Any) -> None:
 
 def _points_of(prediction: Any, reference: Reference, noisy: Any) -> dict[str, Any]:
     points = prediction.vertices if isinstance(prediction, trimesh.Trimesh) else prediction
-    given = {"prediction": points, "reference": reference.points, "reference mesh": reference.vertices, "noisy": noisy}
+    given = {
+        "prediction": points,
+        "reference cloud": reference.points,
+        "reference mesh": reference.vertices,
+        "noisy cloud": noisy,
+    }
     return {name: array for name, array in given.items() if array is not None}
 
 

@@ -3,52 +3,62 @@
 import statistics
 from typing import Any
 
+from n2n.evaluation.measures import MEASURES
+from n2n.evaluation.protocol import CROPPED
 from n2n.tables.grid import FLOOR, OURS, PAPER, Cell, Grid, Published, published
 from n2n.tables.plan import Plan
 from n2n.tables.spec import Fit, Table, Wanted
 from n2n.tables.store import Store, lacking
 
-_FLOORS = ("oracle", "do_nothing", "resample")
-
 
 def fill(table: Table, plan: Plan, store: Store) -> tuple[Grid, Published]:
     """Return a table with every cell filled, or blank for a reason, and the paper's table it belongs to."""
-    paper = published(table.spec["published"])
+    paper = published(table.spec["published"]) if "published" in table.spec else Published(Grid())
     grid = paper.grid
     _derive(grid, table.spec.get("derived", []))
     for wanted in plan.wanted[table.name]:
         grid.put(wanted.row, wanted.column, _cell(wanted, store, plan.protocols))
     _footnotes(grid, table.spec.get("footnotes", []))
     _mark_best(grid, table.spec)
-    return _ordered(grid, table.spec), paper
+    _order(grid)
+    return grid, paper
 
 
 def _cell(wanted: Wanted, store: Store, protocols: dict[str, str]) -> Cell:
-    origin = FLOOR if wanted.value.split(".")[0] in _FLOORS else OURS
+    origin = FLOOR if wanted.floor else OURS
     if wanted.reason:
         return Cell(None, origin, wanted.reason)
-    values, lost = [], []
     groups: dict[str, list[float]] = {}
+    lost: dict[str, str] = {}
     for fit in wanted.fits:
         value, why = _value(wanted, fit, store, protocols)
-        values += [] if value is None else [value]
-        if value is not None:
+        if value is None:
+            lost[fit.shape] = why
+        else:
             groups.setdefault(fit.shape.split("/")[0] if wanted.by_class else "", []).append(value)
-        lost += [f"{fit.shape}: {why}"] if why else []
+    reasons = [f"{shape}: {why}" for shape, why in lost.items()]
+    if not groups:
+        return Cell(None, origin, lost.popitem()[1] if len(set(lost.values())) == 1 else "; ".join(reasons))
+    count = sum(map(len, groups.values()))
     notes = list(wanted.notes)
-    if not values:
-        first = lost[0].partition(": ")[2]
-        return Cell(None, origin, first if len(lost) == len(wanted.fits) and _same(lost) else "; ".join(lost))
     if lost:
-        notes.append(f"mean of {len(values)} of {len(wanted.fits)} shapes; " + "; ".join(lost))
+        notes.append(f"mean of {count} of {len(wanted.fits)} shapes; {'; '.join(reasons)}")
     if wanted.by_class:
         notes.append(f"mean over {len(groups)} classes: {', '.join(groups)}")
     mean = statistics.fmean(statistics.fmean(group) for group in groups.values())
-    return Cell(wanted.scale * mean, origin, shapes=len(values), notes=notes)
+    return Cell(
+        value=wanted.scale * mean,
+        origin=origin,
+        shapes=count,
+        whole=wanted.whole and not lost,
+        higher=_is_higher_better(wanted.value.rpartition(".")[2]),
+        notes=notes,
+    )
 
 
-def _same(lost: list[str]) -> bool:
-    return len({text.partition(": ")[2] for text in lost}) == 1
+def _is_higher_better(metric: str) -> bool:
+    measure = MEASURES.get(metric.removesuffix(CROPPED))
+    return measure is not None and measure.better == "high"
 
 
 def _value(wanted: Wanted, fit: Fit, store: Store, protocols: dict[str, str]) -> tuple[float | None, str]:
@@ -62,7 +72,7 @@ def _value(wanted: Wanted, fit: Fit, store: Store, protocols: dict[str, str]) ->
         return None, "not measured yet by the present definition of the protocol"
     group, _, key = wanted.value.rpartition(".")
     if group == "cost":
-        return record["cost"][key], ""
+        return record["cost"].get(key), "" if key in record["cost"] else f"the {key} of this fit were not measured"
     result: dict[str, Any] = record["results"][wanted.evaluation]
     values = result["floors"].get(group, {}) if group else result["values"]
     value = values.get(key)
@@ -91,33 +101,38 @@ def _footnotes(grid: Grid, rules: list[dict[str, Any]]) -> None:
 
 
 def _mark_best(grid: Grid, spec: dict[str, Any]) -> None:
-    """Mark our numbers that are better than all others they compete with; the paper's own marks stay.
+    """Mark our numbers that no other they compete with betters; the paper's own marks stay.
 
-    A table that compares methods marks us against all of them; an ablation (`competitors: none`) marks nothing.
+    A table that compares methods says along what: `rows` of one group, or `columns` of one group. A number on a part of
+    the data competes with nothing, and neither do what a table calls unfair, floors, and all of an ablation.
     """
-    along = spec.get("competitors", "none")
+    along, unfair = spec.get("competitors", "none"), set(spec.get("unfair", []))
     if along == "none":
         return
-    excluded = set(spec.get("unfair", []))
+
+    def place(row: str, column: str) -> tuple[str, str]:
+        """Return what competitors have in common."""
+        return (_group(row), column) if along == "rows" else (row, _group(column))
+
+    rivals: dict[tuple[str, str], list[Cell]] = {}
     for (row, column), cell in grid.cells.items():
-        if cell.origin != OURS or cell.value is None:
-            continue
-        higher = any(part in spec.get("higher", []) for part in (*row.split("/"), *column.split("/")))
-        rivals = [
-            other.value
-            for (r, c), other in grid.cells.items()
-            if (c == column and r.split("/")[:-1] == row.split("/")[:-1] if along == "rows" else r == row)
-            and other.value is not None
-            and other.origin != FLOOR
-            and not {r, c, r.rpartition("/")[2]} & excluded
-        ]
-        cell.bold = cell.value == (max(rivals) if higher else min(rivals)) if rivals else False
+        fair = not {row, column, row.rpartition("/")[2], column.rpartition("/")[2]} & unfair
+        if fair and cell.whole and cell.value is not None and cell.origin != FLOOR:
+            rivals.setdefault(place(row, column), []).append(cell)
+    for (row, column), cell in grid.cells.items():
+        others = rivals.get(place(row, column), [])
+        if cell.origin == OURS and len(others) > 1 and any(cell is other for other in others):
+            high = cell.higher or {*row.split("/"), *column.split("/")} & set(spec.get("higher", []))
+            cell.bold = cell.value == (max if high else min)(other.value for other in others)
 
 
-def _ordered(grid: Grid, spec: dict[str, Any]) -> Grid:
+def _group(label: str) -> str:
+    return label.rpartition("/")[0]
+
+
+def _order(grid: Grid) -> None:
     """Keep groups of rows together: a row of ours stands after the last one of its group."""
     groups: dict[str, list[str]] = {}
     for row in grid.rows:
         groups.setdefault(row.split("/")[0] if "/" in row else "", []).append(row)
     grid.rows = [row for rows in groups.values() for row in rows]
-    return grid

@@ -22,14 +22,18 @@ class Cell:
         origin: Who says so: paper | n2n | reference value (a floor, or doing nothing).
         reason: Why it is blank.
         shapes: Over how many shapes a number of ours is the mean.
+        whole: These are all shapes of the dataset.
+        higher: Of two such numbers the higher one is better.
         bold: Marked as best, by the paper or by us.
         notes: Footnotes.
     """
 
-    value: float | None
+    value: int | float | None
     origin: str
     reason: str = ""
     shapes: int = 0
+    whole: bool = True
+    higher: bool = False
     bold: bool = False
     notes: list[str] = field(default_factory=list)
 
@@ -56,16 +60,16 @@ class Published:
     """A table as printed.
 
     Attributes:
-        grid: Its cells; a dash of the paper is a blank.
+        grid: Its cells; a dash of the paper is a blank. Empty for a table that the paper does not have.
         caption, dataset, unit: The paper's words.
         notes: What is odd about it.
     """
 
     grid: Grid
-    caption: str
-    dataset: str
-    unit: str
-    notes: list[str]
+    caption: str = ""
+    dataset: str = ""
+    unit: str = ""
+    notes: list[str] = field(default_factory=list)
 
 
 def published(name: str) -> Published:

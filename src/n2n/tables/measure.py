@@ -21,7 +21,7 @@ from n2n.fitting.fit import fit as fit_data
 from n2n.registry import BASELINES, DATAMODULES
 from n2n.tables.memory import peak, reset_peak
 from n2n.tables.spec import Fit
-from n2n.tables.store import protocol_hash, sources
+from n2n.tables.store import deciding, protocol_hash, sources
 from n2n.tasks.field import Field
 
 
@@ -37,36 +37,33 @@ def measure(fit: Fit, evaluations: Mapping[str, Set[str]], samples: int | None =
         Plain data: settings, where and when, cost, results. A failure is a record, too: status `failed` and the error.
     """
     start = time.perf_counter()
-    record: dict[str, Any] = {
-        "id": fit.id,
-        "method": fit.method,
-        "datamodule": fit.datamodule,
-        "shape": fit.shape,
-        "settings": list(fit.settings),
-        "made": _made(),
-    }
+    record: dict[str, Any] = {**fit.described(), "made": _made()}
     try:
         record |= _run(fit, evaluations, samples)
         record["status"] = "done"
     except N2NError as error:
-        record |= {"status": "failed", "error": str(error)}
+        record |= fit.failed(str(error))
     except Exception as error:  # one bad shape never loses the others' results
-        record |= {"status": "failed", "error": f"{type(error).__name__}: {error}"}
+        record |= fit.failed(" ".join(f"{type(error).__name__}: {error}".split()))
     record["cost"] = {**record.get("cost", {}), "seconds": round(time.perf_counter() - start, 2)}
     return record
 
 
 def _run(fit: Fit, evaluations: Mapping[str, Set[str]], samples: int | None) -> dict[str, Any]:
-    config = compose([f"datamodule={fit.datamodule}", f"datamodule.shape={fit.shape}", *fit.settings])
+    shape = fit.shape.replace("'", r"\'")
+    config = compose([f"datamodule={fit.datamodule}", f"datamodule.shape='{shape}'", *fit.settings])
     data = DATAMODULES.build(config["datamodule"], num_observations=config["num_observations"])
     if not isinstance(data, BenchmarkDataModule):
         raise ConfigError(f"datamodule {fit.datamodule!r} knows no true surface; tables need a benchmark datamodule")
-    noisy, made = data.noisy, {"source": data.source}
+    made = {"source": data.source}
     made["config"] = config_hash({**config, "device": None, "data": data.fingerprint()})
-    truth = data.reference
-    if truth.points is None and truth.vertices is None and any(evaluations):
+    wanted = {evaluation: floors for evaluation, floors in sorted(evaluations.items()) if evaluation}
+    results = {}
+    if data.reference.points is None and data.reference.vertices is None:
         blank = {"values": {}, "floors": {}, "blanks": {}, "blank": f"no ground truth of {fit.shape} is present"}
-        return {**made, "results": {e: {**_asked(e, floors), **blank} for e, floors in evaluations.items() if e}}
+        results = {evaluation: {**_asked(evaluation, floors), **blank} for evaluation, floors in wanted.items()}
+        if "" not in evaluations:
+            return {**made, "results": results}
     reset_peak()
     start = time.perf_counter()
     if fit.method == "n2n":
@@ -76,25 +73,28 @@ def _run(fit: Fit, evaluations: Mapping[str, Set[str]], samples: int | None) -> 
     else:
         method, about = BASELINES.build(fit.method), {}
     seconds = time.perf_counter() - start
-    results = {}
-    for evaluation, floors in sorted(evaluations.items()):
-        if not evaluation:
-            continue
-        task, protocol = evaluation.split("/")
-        prediction, seconds_task = _predict(method, task, noisy)
-        scored = _protocol(protocol, floors, samples).evaluate(prediction, truth, noisy)
-        results[evaluation] = {
-            **_asked(evaluation, floors),
-            "values": _short(scored.values),
-            "floors": {name: _short(values) for name, values in scored.floors.items()},
-            "blanks": {**scored.blanks, **scored.floor_blanks},
-            "seconds": round(seconds_task, 2),
-        }
+    for evaluation in [name for name in wanted if name not in results]:
+        results[evaluation] = _evaluate(method, data, evaluation, wanted[evaluation], samples)
     return {
         **made,
         "fit": about,
         "cost": {"minutes": seconds / 60, "memory": peak() / 2**30},
         "results": results,
+    }
+
+
+def _evaluate(
+    method: Any, data: BenchmarkDataModule, evaluation: str, floors: Set[str], samples: int | None
+) -> dict[str, Any]:
+    task, protocol = evaluation.split("/")
+    prediction, seconds = _predict(method, task, data.noisy)
+    scored = _protocol(protocol, floors, samples).evaluate(prediction, data.reference, data.noisy)
+    return {
+        **_asked(evaluation, floors),
+        "values": _short(scored.values),
+        "floors": {name: _short(values) for name, values in scored.floors.items()},
+        "blanks": {**scored.blanks, **scored.floor_blanks},
+        "seconds": round(seconds, 2),
     }
 
 
@@ -146,12 +146,12 @@ def _made() -> dict[str, Any]:
 
 
 def commit() -> str:
-    """Return the commit of a checkout, `+` where it has changes; `unknown` elsewhere."""
+    """Return the commit of a checkout, `+` where files that decide a number were changed since; `unknown` elsewhere."""
     here = Path(__file__).parent
     try:
         name, changes = (
             subprocess.run(["git", "-C", here, *command], capture_output=True, text=True, check=True).stdout.strip()
-            for command in (["rev-parse", "--short", "HEAD"], ["status", "--porcelain", "--", str(here.parent)])
+            for command in (["rev-parse", "--short", "HEAD"], ["status", "--porcelain", "--", *map(str, deciding())])
         )
     except (OSError, subprocess.CalledProcessError):
         return "unknown"

@@ -4,11 +4,13 @@ import functools
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
-from n2n.errors import N2NError
+from n2n.errors import ConfigError, N2NError
 from n2n.registry import DATAMODULES
-from n2n.tables.spec import Fit, Profile, Table, Wanted, expand, load_tables
+from n2n.tables.expand import as_number, expand
+from n2n.tables.spec import Fit, Profile, Table, Wanted, choose, load_tables, own_tables
 from n2n.tables.store import Store, lacking, protocol_hash, sources
 
 
@@ -44,7 +46,7 @@ class Plan:
     jobs: dict[Fit, Job]
 
     def open(self, store: Store) -> list[Job]:
-        """Return the jobs that are not done, with only the evaluations that are lacking."""
+        """Return the jobs that are not done: a fit is not kept, so what lacks one evaluation is measured whole."""
         return [job for job in self.jobs.values() if not self.is_done(job, store)]
 
     def is_done(self, job: Job, store: Store) -> bool:
@@ -66,12 +68,22 @@ class Plan:
         return {evaluation: protocol_hash(evaluation.split("/")[1]) for evaluation in evaluations}
 
 
-def make_plan(names: Sequence[str], profile: Profile, root: str | None = None) -> Plan:
+def make_plan(names: Sequence[str], profile: Profile, root: str | None = None, folder: Path | None = None) -> Plan:
     """Return what the tables asked for need.
 
-    A fit is wanted once with the evaluations of *all* tables, so that asking for another table later fits nothing again.
+    A fit is wanted once with the evaluations of *all* tables: to ask for another table later fits nothing again.
+
+    Args:
+        names: Of tables; empty: all, or those of the folder where one is given.
+        profile: With which effort.
+        root: Data folder; None: environment N2N_DATA, else ./data.
+        folder: With further tables.
+
+    Raises:
+        ConfigError: A name is unknown, or a table asks for something that does not exist.
     """
-    chosen, everything = load_tables(list(names)), load_tables()
+    everything = load_tables(folder=folder)
+    chosen = choose(everything, names or list(own_tables(folder)))
     present = functools.cache(functools.partial(shapes_present, root=root))
     cells = {table.name: expand(table, profile, present) for table in everything}
     jobs: dict[Fit, Job] = {}
@@ -81,20 +93,18 @@ def make_plan(names: Sequence[str], profile: Profile, root: str | None = None) -
                 job = jobs.setdefault(fit, Job(fit))
                 job.evaluations.setdefault(cell.evaluation, set()).update({cell.floor} - {""})
                 job.tables.add(name)
-    asked = {table.name for table in chosen}
-    ordered = {
-        fit: jobs[fit]
-        for table in chosen
-        for cell in cells[table.name]
-        for fit in cell.fits
-        if jobs[fit].tables & asked
-    }
-    return Plan(profile, chosen, {name: cells[name] for name in asked}, ordered)
+    asked = {table.name: cells[table.name] for table in chosen}
+    ordered = {fit: jobs[fit] for wanted in asked.values() for cell in wanted for fit in cell.fits}
+    plan = Plan(profile, chosen, asked, ordered)
+    plan.protocols  # noqa: B018 - an unknown protocol is found now, not after the fit
+    return plan
 
 
 def shapes_present(datamodule: str, root: str | None = None) -> tuple[list[str], str | None]:
     """Return the shapes of a dataset that are at hand, and what is missing and where to get it."""
     component: Any = DATAMODULES.get(datamodule)
+    if not hasattr(component, "names"):
+        raise ConfigError(f"datamodule {datamodule!r} knows no true surface; tables need a BenchmarkDataModule")
     try:
         return component.names(root), component.missing(root)
     except N2NError as error:
@@ -107,18 +117,19 @@ def estimate(job: Job, gpu: bool = False) -> float:
     if job.fit.method != "n2n":
         return 10.0
     costs = _COSTS["gpu" if gpu else "cpu"]
-    points = float(settings.get("datamodule.points", 10_000))
-    observations = float(settings.get("num_observations", 1))
+    points = as_number(settings.get("datamodule.points", ""), 10_000)
+    observations = as_number(settings.get("num_observations", ""), 1)
     tasks = 1.0 * len(job.evaluations)
     if settings.get("recipe", "fast") == "paper":
-        return float(settings.get("iterations", 800_000)) * costs["paper_step"] * _load(settings) + tasks
+        return as_number(settings.get("iterations", ""), 800_000) * costs["paper_step"] * _load(settings) + tasks
     seen = min(points * observations, 16 * 32_768)
     return costs["start"] + costs["per_point"] * seen + tasks
 
 
 def _load(settings: dict[str, str]) -> float:
     """Return how much dearer a step of the paper's recipe is than one with B = 250: the matching is cubic in B."""
-    batch = float(settings.get("batch_size", 5000 if settings.get("task") == "reconstruct" else 250)) / 250
+    usual = 5000 if settings.get("task") == "reconstruct" else 250
+    batch = as_number(settings.get("batch_size", ""), usual) / 250
     return max(1.0, 0.5 * batch + 0.002 * batch**2.5)
 
 

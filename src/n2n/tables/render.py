@@ -4,7 +4,7 @@ import csv
 import io
 from dataclasses import dataclass
 
-from n2n.tables.grid import FLOOR, OURS, Cell, Grid
+from n2n.tables.grid import OURS, PAPER, Cell, Grid
 
 _DIGITS = 3
 
@@ -33,7 +33,7 @@ def render(title: str, about: list[str], grid: Grid) -> Rendered:
     mine = [cell for cell in grid.cells.values() if cell.origin == OURS]
     return Rendered(
         markdown=_markdown(title, about, grid.columns, rows, notes.lines),
-        latex=_latex(title, grid, notes.lines),
+        latex=_latex(title, grid, notes),
         csv=_csv(grid),
         ours=sum(cell.value is not None for cell in mine),
         blank=sum(cell.value is None for cell in mine),
@@ -64,10 +64,15 @@ def number(value: float) -> str:
     return f"{value:.{_DIGITS}f}"
 
 
+def _remarks(cell: Cell) -> list[str]:
+    """Return the footnotes of a cell; that the paper has a dash needs none."""
+    return [*cell.notes, *([cell.reason] if cell.value is None and cell.origin != PAPER else [])]
+
+
 def _text(cell: Cell | None, notes: _Notes) -> str:
     if cell is None:
         return ""
-    marks = notes.mark([*cell.notes, *([cell.reason] if cell.value is None and cell.origin != "paper" else [])])
+    marks = notes.mark(_remarks(cell))
     raised = f"<sup>{marks}</sup>" if marks else ""
     if cell.value is None:
         return f"-{raised}"
@@ -77,15 +82,17 @@ def _text(cell: Cell | None, notes: _Notes) -> str:
 
 def _markdown(title: str, about: list[str], columns: list[str], rows: list[list[str]], notes: list[str]) -> str:
     lines = [f"# {title}", "", *(f"{line}  " for line in about), ""]
-    lines += ["| |" + "|".join(f" {c} " for c in columns) + "|", "|---|" + "---:|" * len(columns)]
-    lines += ["| " + " | ".join(row) + " |" for row in rows]
+    lines += ["| |" + "".join(f" {_plain(column)} |" for column in columns), "|---|" + "---:|" * len(columns)]
+    lines += [f"| {' | '.join([_plain(label), *texts])} |" for label, *texts in rows]
     lines += ["", *(f"{index}. {text}" for index, text in enumerate(notes, 1))]
     return "\n".join(lines).rstrip() + "\n"
 
 
-def _latex(title: str, grid: Grid, notes: list[str]) -> str:
-    marks = _Notes()
-    marks.lines = list(notes)
+def _plain(label: str) -> str:
+    return label.replace("|", r"\|")
+
+
+def _latex(title: str, grid: Grid, notes: _Notes) -> str:
     lines = [
         "% needs booktabs",
         r"\begin{table}",
@@ -96,27 +103,38 @@ def _latex(title: str, grid: Grid, notes: list[str]) -> str:
         r"\midrule",
     ]
     for row in grid.rows:
-        cells = []
-        for column in grid.columns:
-            cell = grid.cells.get((row, column))
-            if cell is None:
-                cells.append("")
-                continue
-            text = "--" if cell.value is None else number(cell.value)
-            text = rf"\textbf{{{text}}}" if cell.bold else text
-            reason = [cell.reason] if cell.value is None and cell.origin != "paper" else []
-            raised = marks.mark([*cell.notes, *reason])
-            cells.append(text + (rf"$^{{{raised}}}$" if raised else ""))
+        cells = [_tex(grid.cells.get((row, column)), notes) for column in grid.columns]
         lines.append(" & ".join([_escape(row), *cells]) + r" \\")
     lines += [r"\bottomrule", r"\end{tabular}"]
-    lines += [rf"\par\footnotesize $^{{{i}}}$ {_escape(text)}" for i, text in enumerate(notes, 1)]
+    lines += [rf"\par\footnotesize $^{{{i}}}$ {_escape(text)}" for i, text in enumerate(notes.lines, 1)]
     return "\n".join([*lines, r"\end{table}", ""])
 
 
+def _tex(cell: Cell | None, notes: _Notes) -> str:
+    if cell is None:
+        return ""
+    marks = notes.mark(_remarks(cell))
+    raised = f"$^{{{marks}}}$" if marks else ""
+    if cell.value is None:
+        return f"--{raised}"
+    text = number(cell.value)
+    return (rf"\textbf{{{text}}}" if cell.bold else text) + raised
+
+
+_TEX = str.maketrans(
+    {
+        **{sign: rf"\{sign}" for sign in "&%$#_{}"},
+        "\\": r"\textbackslash{}",
+        "^": r"\textasciicircum{}",
+        "~": r"\textasciitilde{}",
+        "<": r"\textless{}",
+        ">": r"\textgreater{}",
+    }
+)
+
+
 def _escape(text: str) -> str:
-    for plain, tex in (("\\", r"\textbackslash{}"), ("&", r"\&"), ("%", r"\%"), ("_", r"\_"), ("#", r"\#")):
-        text = text.replace(plain, tex)
-    return text.replace("^", r"\^{}").replace("~", r"\~{}")
+    return text.translate(_TEX)
 
 
 def _csv(grid: Grid) -> str:
@@ -130,6 +148,6 @@ def _csv(grid: Grid) -> str:
             if cell is not None:
                 value = "" if cell.value is None else f"{cell.value:.6g}"
                 remark = "; ".join([*([cell.reason] if cell.value is None else []), *cell.notes])
-                shapes = cell.shapes if cell.origin in (OURS, FLOOR) and cell.shapes else ""
+                shapes = cell.shapes or ""
                 writer.writerow([row, column, value, cell.origin, shapes, int(cell.bold), remark])
     return out.getvalue()

@@ -3,14 +3,19 @@
 import functools
 import multiprocessing
 import os
-from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, as_completed
+import signal
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from typing import Any
 
 from n2n.tables.plan import Job, Plan, cores
 from n2n.tables.store import Store
 
+Record = dict[str, Any]
 Told = Callable[[Job, str], None]
 
 
@@ -27,10 +32,10 @@ def run(plan: Plan, store: Store, workers: int, again: bool = False, told: Told 
     Returns:
         The failures, each with its reason.
     """
-    jobs = plan.open(store) + (plan.stale(store) if again else [])
+    waiting = plan.open(store) + (plan.stale(store) if again else [])
     failures: list[tuple[Job, str]] = []
 
-    def finish(job: Job, record: dict) -> None:
+    def finish(job: Job, record: Record) -> None:
         store.write(job.fit, record)
         error = record.get("error", "")
         if error:
@@ -38,37 +43,42 @@ def run(plan: Plan, store: Store, workers: int, again: bool = False, told: Told 
         if told:
             told(job, error)
 
-    # A worker that dies takes its pool along and all that waited there; who is left gets a new pool, one job at a time.
     measure = functools.partial(_measure, samples=plan.profile.samples)
-    waiting = _pass(measure, jobs, workers, finish)
-    for job in waiting:
-        for lost in _pass(measure, [job], 1, finish):
-            finish(lost, {"status": "failed", "error": "the process was killed, most likely for want of memory"})
+    while waiting:
+        # A process that dies takes its pool along. Each of those that were running is tried alone, to see which it was.
+        lost = _pass(measure, waiting, workers, finish)
+        suspects, waiting = lost[:workers], lost[workers:]
+        for job in suspects:
+            for guilty in _pass(measure, [job], 1, finish):
+                finish(guilty, guilty.fit.failed("the process was killed, most likely for want of memory"))
     return failures
 
 
 def _pass(
-    measure: Callable[[Job], dict], jobs: list[Job], workers: int, finish: Callable[[Job, dict], None]
+    measure: Callable[[Job], Record], jobs: Sequence[Job], workers: int, finish: Callable[[Job, Record], None]
 ) -> list[Job]:
-    """Run jobs; return those that were lost because a process died."""
-    lost: list[Job] = []
-    if not jobs:
-        return lost
+    """Run jobs until all are done or a process dies; return those that are left, first those that were running."""
+    waiting, running, lost = deque(jobs), dict[Future[Record], Job](), list[Job]()
     with _threads(max(1, cores() // workers)), _pool(workers) as pool:
-        running = {pool.submit(measure, job): job for job in jobs}
-        try:
-            for future in as_completed(running):
+        while running or (waiting and not lost):
+            while waiting and len(running) < workers and not lost:
+                job = waiting.popleft()
                 try:
-                    finish(running[future], future.result())
+                    running[pool.submit(measure, job)] = job
                 except BrokenProcessPool:
-                    lost.append(running[future])
-        except KeyboardInterrupt:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-    return lost
+                    lost.append(job)
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                job = running.pop(future)
+                try:
+                    record = future.result()
+                except BrokenProcessPool:
+                    lost.append(job)
+                else:
+                    finish(job, record)
+    return [*lost, *waiting]
 
 
-def _measure(job: Job, samples: int | None) -> dict:
+def _measure(job: Job, samples: int | None) -> Record:
     # Imported where it runs: the parent process needs no torch.
     from n2n.tables.measure import measure
 
@@ -76,15 +86,35 @@ def _measure(job: Job, samples: int | None) -> dict:
 
 
 @contextmanager
-def _pool(workers: int):
+def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
     # `spawn`: a forked process would share the threads and locks of torch.
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context) as pool:
-        yield pool
+    before = set(multiprocessing.active_children())
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=_follow_parent) as pool:
+        try:
+            yield pool
+        except BaseException:
+            # Nobody is there to keep what they still measure, and the pool would wait for it.
+            for process in set(multiprocessing.active_children()) - before:
+                process.terminate()
+            raise
+
+
+def _follow_parent() -> None:
+    """Leave ^C to the parent, and end when it ends, however that is: a killed parent cannot say so."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 @contextmanager
-def _threads(count: int):
+def _threads(count: int) -> Iterator[None]:
     """Give each process its share of the cores; numerical libraries read this when they are imported."""
     names = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
     before = {name: os.environ.get(name) for name in names}

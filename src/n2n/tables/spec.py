@@ -1,27 +1,22 @@
 """A table as data: which fits, on which shapes, measured how, become which cells (conf/table, conf/profile)."""
 
 import hashlib
-import itertools
 import json
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from fnmatch import fnmatch
+from importlib.metadata import entry_points
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from n2n.compose import conf_dir
+from n2n.compose import CONF_PLUGINS, conf_dir
 from n2n.errors import ConfigError
 from n2n.registry import suggest
+from n2n.tables.check import check_profile, check_table
 
-# What an experiment, a cell and a profile may say: anything else is a typing error.
-_TABLE = {
-    "title", "published", "competitors", "higher", "unfair", "experiments", "footnotes", "derived", "profiles",
-}  # fmt: skip
-_EXPERIMENT = {"datamodule", "method", "shapes", "axes", "settings", "evaluate", "cells", "only", "note"}
-_PROFILE = {"title", "settings", "datamodule", "keep", "shapes", "limits", "samples"}
-_CELL = {"row", "column", "value", "scale", "evaluate", "mean"}
+_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # libyaml, where it was built in, is ten times faster
 
 
 @dataclass(frozen=True)
@@ -46,6 +41,20 @@ class Fit:
         content = json.dumps([self.method, self.datamodule, self.shape, self.settings])
         return hashlib.sha256(content.encode()).hexdigest()[:12]
 
+    def described(self) -> dict[str, Any]:
+        """Return what a record says about itself."""
+        return {
+            "id": self.id,
+            "method": self.method,
+            "datamodule": self.datamodule,
+            "shape": self.shape,
+            "settings": list(self.settings),
+        }
+
+    def failed(self, error: str) -> dict[str, Any]:
+        """Return the record of a fit that came to nothing."""
+        return {**self.described(), "status": "failed", "error": error}
+
 
 @dataclass
 class Wanted:
@@ -58,6 +67,7 @@ class Wanted:
         scale: Factor to the table's unit.
         fits: One per shape; the cell is the mean over them.
         by_class: Mean over classes (what stands before the `/` of a shape's name) of the means over their shapes.
+        whole: The shapes are all of the dataset, so that the number can be set against one for the dataset.
         reason: Why it must stay blank; empty otherwise.
         notes: Footnotes.
     """
@@ -68,6 +78,7 @@ class Wanted:
     value: str
     scale: float
     by_class: bool = False
+    whole: bool = True
     fits: list[Fit] = field(default_factory=list)
     reason: str = ""
     notes: list[str] = field(default_factory=list)
@@ -112,153 +123,91 @@ class Profile:
     datamodule: str | None = None
     keep: list[str] = field(default_factory=list)
     shapes: int | None = None
-    limits: dict[str, float] = field(default_factory=dict)
+    limits: dict[str, int | float] = field(default_factory=dict)
     samples: int | None = None
 
 
-# Of a datamodule: names of the shapes present, and what is missing and where to get it.
-Present = Callable[[str], tuple[list[str], str | None]]
+def load_tables(names: Sequence[str] = (), folder: Path | None = None) -> list[Table]:
+    """Read tables: ours (conf/table), those of installed packages, those of a folder.
 
-
-def load_tables(names: list[str] | None = None) -> list[Table]:
-    """Read the tables of conf/table; all, or those asked for by name or by its start (`T01`).
+    Args:
+        names: Which, by name or by how it begins (`T01`); empty: all.
+        folder: With further tables.
 
     Raises:
         ConfigError: Unknown name, or a table that says what no table may say.
     """
-    known = {path.stem: path for path in sorted((conf_dir() / "table").glob("*.yaml"))}
-    chosen = list(known) if not names else [_match(name, list(known)) for name in names]
     tables = []
-    for name in dict.fromkeys(chosen):
-        spec = _read(known[name])
-        _check_keys(known[name], spec, _TABLE)
-        for experiment in spec["experiments"]:
-            _check_keys(known[name], experiment, _EXPERIMENT)
-            for cell in experiment["cells"]:
-                _check_keys(known[name], cell, _CELL)
+    for name, path in {**_options("table"), **own_tables(folder)}.items():
+        spec = _read(path)
+        check_table(str(path), spec)
         tables.append(Table(name, spec))
-    return tables
+    return choose(tables, names)
+
+
+def choose(tables: list[Table], names: Sequence[str]) -> list[Table]:
+    """Return the tables of some names, or of how they begin, each once; without names all.
+
+    Raises:
+        ConfigError: Unknown name, or one that may be several tables.
+    """
+    known = {table.name: table for table in tables}
+    chosen = dict.fromkeys(_match(name, list(known)) for name in names) or known
+    return [known[name] for name in chosen]
+
+
+def own_tables(folder: Path | None) -> dict[str, Path]:
+    """Return the tables of a folder: name -> file.
+
+    Raises:
+        ConfigError: There are none, or one is called like a table of n2n or of a plugin.
+    """
+    if folder is None:
+        return {}
+    found = {path.stem: path for path in sorted(folder.glob("*.yaml"))}
+    if not found:
+        raise ConfigError(f"{folder}: no table found there; a table is a file *.yaml like those of {conf_dir()}/table")
+    for name in sorted(found.keys() & _options("table").keys()):
+        raise ConfigError(f"{found[name]}: a table {name!r} exists already; give yours another name")
+    return found
 
 
 def load_profile(name: str) -> Profile:
-    """Read a profile of conf/profile."""
-    known = {path.stem: path for path in sorted((conf_dir() / "profile").glob("*.yaml"))}
+    """Read a profile of conf/profile, or of an installed package."""
+    known = _options("profile")
     if name not in known:
         raise ConfigError(f"Unknown profile {name!r}.{suggest(name, list(known))}")
     spec = _read(known[name])
-    _check_keys(known[name], spec, _PROFILE)
+    check_profile(str(known[name]), spec)
     return Profile(name, **spec)
 
 
-def expand(table: Table, profile: Profile, present: Present) -> list[Wanted]:
-    """Return every cell of ours in a table, in order.
-
-    Args:
-        table: What to measure.
-        profile: With which effort.
-        present: Tells the shapes of a datamodule that are at hand.
-    """
-    own = table.spec.get("profiles", {}).get(profile.name, {})
-    cells = []
-    for experiment in table.spec["experiments"]:
-        if profile.name in experiment.get("only", [profile.name]):
-            cells += _experiment(experiment, own, profile, present)
-    return cells
-
-
-def _experiment(spec: dict[str, Any], own: dict[str, Any], profile: Profile, present: Present) -> list[Wanted]:
-    axes = {name: {str(k): v for k, v in values.items()} for name, values in spec.get("axes", {}).items()}
-    for name in axes:
-        axes[name].update({str(k): v for k, v in own.get("axes", {}).get(name, {}).items()})
-    wanted = []
-    for labels in itertools.product(*axes.values()):
-        point = {name: (label, axes[name][label]) for name, label in zip(axes, labels, strict=True)}
-        for cell in spec["cells"]:
-            evaluation = _fill(cell.get("evaluate", spec.get("evaluate", "")), point, 1)
-            # Settings may depend on what the field is for: `task={task}`.
-            task = evaluation.split("/")[0] or "denoise"
-            fits, reason, notes = _fits(spec, own, profile, present, {**point, "task": (task, task)})
-            wanted.append(
-                Wanted(
-                    row=_fill(cell["row"], point, 0),
-                    column=_fill(cell["column"], point, 0),
-                    evaluation=evaluation,
-                    value=_fill(cell["value"], point, 1),
-                    scale=float(cell.get("scale", 1)),
-                    by_class=cell.get("mean") == "class",
-                    fits=fits,
-                    reason=reason,
-                    notes=[spec["note"], *notes] if "note" in spec else notes,
-                )
-            )
-    return wanted
-
-
-def _fits(
-    spec: dict[str, Any], own: dict[str, Any], profile: Profile, present: Present, point: dict[str, tuple[str, Any]]
-) -> tuple[list[Fit], str, list[str]]:
-    """Return the fits at one point of the axes, or why there are none, and what a reader must know about them."""
-    for _, value in point.values():
-        if isinstance(value, dict):
-            return [], str(value["skip"]), []
-    datamodule = profile.datamodule or spec["datamodule"]
-    names, missing = present(datamodule)
-    pattern = "*" if profile.datamodule else _fill(str(spec.get("shapes", "*")), point, 1)
-    names = [name for name in names if fnmatch(name, pattern)]
-    wanted = own.get("shapes")
-    notes = []
-    if not names:
-        return [], missing or f"{datamodule}: no shape {pattern} is here", []
-    if missing and not profile.datamodule:
-        notes.append(missing)
-    if wanted and not profile.datamodule:
-        names = [name for name in names if name in wanted]
-        if not names:
-            return [], f"{datamodule}: none of the shapes {', '.join(wanted)} is here", []
-    names = names[: profile.shapes]
-    settings = [*profile.settings, *own.get("settings", []), *spec.get("settings", [])]
-    kept = _settings([_fill(text, point, 1) for text in settings], profile)
-    method = spec.get("method", "n2n")
-    return [Fit(method, datamodule, name, kept) for name in names], "", notes
-
-
-def _settings(settings: list[str], profile: Profile) -> tuple[str, ...]:
-    """Return each key once, the last word counting, within the profile's limits."""
-    values = dict(text.split("=", 1) for group in settings for text in group.split())
-    for key in list(values):
-        if profile.datamodule and key.startswith("datamodule.") and key not in profile.keep:
-            del values[key]
-    for key, limit in profile.limits.items():
-        if key in values and float(values[key]) > limit:
-            values[key] = f"{limit:g}"
-    return tuple(f"{key}={value}" for key, value in sorted(values.items()))
-
-
-def _fill(text: str, point: dict[str, tuple[str, Any]], which: int) -> str:
-    """Put labels (0) or values (1) of the axes in the place of `{axis}`."""
-    for name, pair in point.items():
-        text = text.replace("{" + name + "}", str(pair[which]))
-    return text
+def _options(group: str) -> dict[str, Any]:
+    """Return option -> file; ours win over a plugin's of the same name."""
+    folders = [files(point.value) / group for point in entry_points(group=CONF_PLUGINS)]
+    found = {}
+    for folder in [*folders, conf_dir() / group]:
+        if folder.is_dir():
+            found |= {file.name[:-5]: file for file in folder.iterdir() if file.name.endswith(".yaml")}
+    return dict(sorted(found.items()))
 
 
 def _match(name: str, known: list[str]) -> str:
     found = [k for k in known if k == name] or [k for k in known if k.lower().startswith(name.lower())]
-    if len(found) != 1:
+    if len(found) > 1:
+        raise ConfigError(f"table {name!r} may be any of {', '.join(found)}; write more of the name")
+    if not found:
         raise ConfigError(f"Unknown table {name!r}.{suggest(name, known)}")
     return found[0]
 
 
-def _read(path: Path) -> dict[str, Any]:
+def _read(path: Any) -> dict[str, Any]:
     try:
-        spec = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except yaml.YAMLError as error:
+        spec = yaml.load(path.read_text(encoding="utf-8"), _LOADER)
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path}: is not YAML ({' '.join(str(error).split())})") from error
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read ({error.strerror})") from error
     if not isinstance(spec, dict):
-        raise ConfigError(f"{path}: holds no settings; see the other files of {path.parent}")
+        raise ConfigError(f"{path}: holds no settings; see the other files of {conf_dir()}/table")
     return spec
-
-
-def _check_keys(path: Path, spec: dict[str, Any], known: set[str]) -> None:
-    for key in spec:
-        if key not in known:
-            raise ConfigError(f"{path}: Unknown key {key!r}.{suggest(key, sorted(known))}")

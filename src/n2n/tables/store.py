@@ -21,6 +21,9 @@ _DECIDING = (
 )  # fmt: skip
 _NOT_DECIDING = {"table", "profile", "protocol", "logger", "experiment", "debug"}
 
+# What a record of each status must hold.
+_NEEDED = {"done": ("results", "cost", "made"), "failed": ("error",)}
+
 
 class Store:
     """Results under a folder: `<datamodule>/<shape>-<id>.json`.
@@ -44,11 +47,16 @@ class Store:
         """
         path = self.path(fit)
         try:
-            return json.loads(path.read_text(encoding="utf-8"))
+            record = json.loads(path.read_text(encoding="utf-8"))
         except FileNotFoundError:
             return None
         except (OSError, ValueError) as error:
             raise InputError(f"{path}: cannot be read ({error}); delete it, it will be measured again") from error
+        needed = _NEEDED.get(record.get("status"), ("a known status",)) if isinstance(record, dict) else ("a record",)
+        for key in needed:
+            if not isinstance(record, dict) or key not in record:
+                raise InputError(f"{path}: lacks {key}; delete it, it will be measured again")
+        return record
 
     def write(self, fit: Fit, record: dict[str, Any]) -> None:
         """Keep a result, whole or not at all.
@@ -93,13 +101,18 @@ def protocol_hash(name: str) -> str:
 @functools.cache
 def sources() -> str:
     """Return 10 hex digits of all source files that decide a number: results of others may differ."""
-    package, conf = Path(__file__).parent.parent, conf_dir()
-    files = [path for name in _DECIDING for path in sorted(_python(package / name))]
-    files += [path for path in sorted(conf.rglob("*.yaml")) if path.relative_to(conf).parts[0] not in _NOT_DECIDING]
     digest = hashlib.sha256()
-    for path in files:
+    for path in deciding():
         digest.update(path.name.encode() + b"\0" + _meaning(path).encode())
     return digest.hexdigest()[:10]
+
+
+def deciding() -> list[Path]:
+    """Return the files that decide a number."""
+    package, conf = Path(__file__).parent.parent, conf_dir()
+    python = [path for name in _DECIDING for path in sorted(_python(package / name))]
+    options = [path for path in sorted(conf.rglob("*.yaml")) if path.relative_to(conf).parts[0] not in _NOT_DECIDING]
+    return python + options
 
 
 def _meaning(path: Path) -> str:

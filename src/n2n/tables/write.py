@@ -21,7 +21,7 @@ def write_tables(plan: Plan, store: Store, out: Path) -> dict[str, Rendered]:
         grid, paper = fill(table, plan, store)
         about = [
             f"Profile {plan.profile.name}: {plan.profile.title}.",
-            f"Paper: {paper.dataset}; {paper.unit}.",
+            *([f"Paper: {paper.dataset}; {paper.unit}."] if paper.dataset else []),
             *(f"Of the paper's table: {note}." for note in paper.notes),
         ]
         made[table.name] = render(f"{table.name}: {table.title}", about, grid)
@@ -39,9 +39,9 @@ def _index(plan: Plan, store: Store, made: dict[str, Rendered]) -> str:
     lines = [
         f"# Tables, profile {plan.profile.name}",
         "",
-        f"{plan.profile.title}. Our numbers stand beside the published ones; **bold** in a row or column of the paper is "
-        "the paper's mark, in one of ours it means better than all that it can be compared with. A dash carries the "
-        "reason as a footnote.",
+        f"{plan.profile.title}. Our numbers stand beside the published ones. **Bold** in a row or column of the paper "
+        "is the paper's mark; in one of ours it means that no other number for the same whole dataset is better. A "
+        "dash carries its reason as a footnote.",
         "",
         "| table | | cells of ours | blank |",
         "|---|---|---:|---:|",

@@ -11,6 +11,7 @@ from n2n.datamodules.shapenet import CLASSES, ShapeNetDataModule
 from n2n.errors import InputError
 from n2n.formats import Cloud, write_cloud, write_mesh
 
+STEM = "galera100k_noise_white_"
 IDS = ("1a", "2b")
 
 
@@ -175,6 +176,105 @@ def test_pc_official_noise_keeps_its_rows(root):
     np.testing.assert_allclose(moved, 8 / 400, rtol=0.02)
     with pytest.raises(InputError, match=r"no official noisy file for galera, noise 2.00e-02"):
         _pc(root, official=True, noise=0.02)
+
+
+def test_pc_copies_beside_an_official_one_have_its_level(tmp_path):
+    """A flat box: its longest edge is 1.9 radii, so that the two units differ."""
+    clean = 30 * np.random.default_rng(3).uniform(-1, 1, (100_000, 3)) * [1.0, 0.3, 0.1] + [5, 0, 0]
+    noisy = clean + 0.025 * 60 * np.random.default_rng(4).standard_normal(clean.shape)
+    _write(tmp_path / "PCNet/galera100k.xyz", clean)
+    _write(tmp_path / "PCNet/galera100k_noise_white_2.50e-02.xyz", noisy)
+    data = _pc(tmp_path, official=True, noise=0.025, points=2000, num_observations=3)
+    copies = [data.frames[0].to_world(cloud.double().numpy()) for cloud in data.shapes[0]]
+    thickness = [np.std(copy[:, 2]) for copy in copies]
+    expected = np.hypot(np.std(data.reference.points[:, 2]), 0.025 * np.ptp(data.reference.points, axis=0).max())
+    np.testing.assert_allclose(thickness, expected, rtol=0.06)
+    assert "noise 0.025 of the longest edge" in data.source
+    assert "noise 0.025 of the radius" in _pc(tmp_path, noise=0.025).source
+
+
+@pytest.mark.parametrize("level", ["2.50e-03", "5.00e-03", "1.00e-02", "1.50e-02", "2.50e-02"])
+def test_all_official_levels_of_pc(root, tmp_path, level):
+    (tmp_path / "PCNet").mkdir()
+    (tmp_path / "PCNet/galera100k.xyz").symlink_to(root / "PCNet/galera100k.xyz")
+    (tmp_path / f"PCNet/galera100k_noise_white_{level}.xyz").symlink_to(
+        root / "PCNet/galera100k_noise_white_1.00e-02.xyz"
+    )
+    assert f"galera100k_noise_white_{level}.xyz" in _pc(tmp_path, official=True, noise=float(level)).source
+
+
+def _copy_pc(root, folder):
+    folder.mkdir(parents=True)
+    for path in (root / "PCNet").glob("galera100k*.xyz"):
+        (folder / path.name).symlink_to(path)
+
+
+@pytest.mark.parametrize("meshes", ["PCNet/meshes/inner", "pointCleanNetDataset/meshes"])
+def test_pc_as_fetched_clouds_in_one_folder_meshes_in_another(root, tmp_path, meshes):
+    _copy_pc(root, tmp_path / "pointCleanNetDataset")
+    mesh = trimesh.creation.icosphere(4, 400).apply_translation((0, 0, 1000))
+    (tmp_path / meshes).mkdir(parents=True)
+    write_mesh(tmp_path / meshes / "galera.off", mesh)
+    data = _pc(tmp_path)
+    assert PCDataModule.names(str(tmp_path)) == ["galera"] and data.reference.faces.shape == (5120, 3)
+    assert "mesh " + meshes + "/galera.off" in data.source
+    np.testing.assert_allclose(np.linalg.norm(data.reference.vertices, axis=1), 1, atol=0.01)
+    for scale, shift in ((1.0, 30.0), (1.06, 0.0), (0.01, 0.0)):
+        write_mesh(tmp_path / meshes / "galera.off", mesh.copy().apply_translation((0, shift, 0)).apply_scale(scale))
+        data = _pc(tmp_path)
+        assert data.reference.vertices is None and "left aside, the cloud does not lie on it" in data.source
+    (tmp_path / meshes / "galera.off").write_text("OFF\n")
+    assert "left aside, it cannot be read" in _pc(tmp_path).source
+
+
+def test_pc_of_score_denoise_beside_the_original(root, tmp_path):
+    """Its clouds have another scale; its examples are relative to the radius."""
+    _copy_pc(root, tmp_path / "data/pointCleanNetDataset")
+    clean = 3 * _ball(10_000, 5)
+    noisy = clean + 0.02 * 3 * np.random.default_rng(6).standard_normal(clean.shape)
+    _write(tmp_path / "data/PCNet/pointclouds/test/10000_poisson/galera.xyz", clean)
+    _write(tmp_path / "data/examples/PCNet_10000_poisson_0.02/galera.xyz", noisy)
+    _write(tmp_path / "data/PCNet/pointclouds/test/10000_poisson/dragon.xyz", clean)
+    assert PCDataModule.names(str(tmp_path)) == ["galera", "dragon"]
+    data = _pc(tmp_path, points=10_000, noise=0.02, official=True, num_observations=2)
+    np.testing.assert_allclose((data.noisy - data.reference.points).std(axis=0), 0.02, rtol=0.03)
+    assert "data/PCNet/pointclouds/test/10000_poisson/galera.xyz" in data.source
+    assert "data/examples/PCNet_10000_poisson_0.02/galera.xyz" in data.source and "of the radius" in data.source
+    # No example of this level: the rows of PointCleanNet, in its own unit.
+    other = _pc(tmp_path, points=10_000, noise=0.01, official=True)
+    assert "galera100k_noise_white_1.00e-02.xyz" in other.source and "of the longest edge" in other.source
+    # Another density comes from the 100 000; mixed with a stored cloud of another scale it is refused.
+    assert "galera100k.xyz, 700 of 100000" in _pc(tmp_path).source
+    with pytest.raises(InputError, match="expected both in one frame"):
+        _pc(tmp_path, points=10_000, reference_points=20_000)
+    # A shape of which only the Poisson-disk cloud is here is thinned from that.
+    thinned = _pc(tmp_path, shape="dragon")
+    assert "10000_poisson/dragon.xyz, 700 of 10000 points by Poisson disks" in thinned.source
+    with pytest.raises(InputError, match=r"dragon\.xyz: holds 10000 points, 20000 were asked for"):
+        _pc(tmp_path, shape="dragon", points=20_000)
+
+
+def test_pu_shapes_without_a_mesh_have_their_clouds(root, tmp_path):
+    clean = _ball(10_000) * [5, 3, 2] + [100, -20, 7]
+    noisy = clean + 0.05 * np.random.default_rng(9).standard_normal(clean.shape)
+    _write(tmp_path / "data/PUNet/pointclouds/test/10000_poisson/sculpt.xyz", clean)
+    _write(tmp_path / "data/examples/PUNet_10000_poisson_0.01/sculpt.xyz", noisy)
+    mesh = tmp_path / "data/PUNet/meshes/test/duck.off"
+    mesh.parent.mkdir(parents=True)
+    mesh.write_bytes((root / "PUNet/meshes/test/duck.off").read_bytes())
+    assert PUDataModule.names(str(tmp_path)) == ["duck", "sculpt"]
+    data = _pu(tmp_path, shape="sculpt", points=10_000, official=True)
+    assert data.reference.vertices is None and data.reference.points.shape == (10_000, 3)
+    assert "there is no mesh" in data.source and "there is no mesh" not in _pu(tmp_path).source
+    scale = np.linalg.norm(clean - (clean.min(axis=0) + clean.max(axis=0)) / 2, axis=1).max()
+    np.testing.assert_allclose((data.noisy - data.reference.points) * scale, noisy - clean, atol=1e-6)
+    sparse = _pu(tmp_path, shape="sculpt", points=500, reference_points=2000)
+    assert len(sparse.noisy) == 500 and len(sparse.reference.points) == 2000
+    with pytest.raises(InputError, match=r"sculpt.xyz: holds 10000 points, 20000 were asked for"):
+        _pu(tmp_path, shape="sculpt", points=20_000)
+    missing = PUDataModule.missing(str(tmp_path))
+    assert "PU meshes, for P2M, not present: sculpt;" in missing
+    assert "sculpt" not in missing.split(";")[0] and "duck" not in missing
 
 
 def test_names_and_what_is_missing(root):

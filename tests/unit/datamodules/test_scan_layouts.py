@@ -213,6 +213,25 @@ def test_dfaust_of_sap_and_raw(tmp_path):
     assert sap.name == "50002_hips" and sap.reference.faces.shape == (320, 3)
 
 
+@pytest.mark.parametrize("place", ["", "data/", "dfaust/"])
+def test_dfaust_as_its_owners_ship_it(tmp_path, place):
+    mesh(tmp_path / f"{place}scans/50002/hips/hips.000380.ply")
+    cloud(tmp_path / "srb/scans/anchor.ply", ball())
+    assert DFaustDataModule.names(str(tmp_path)) == ["50002/hips/hips.000380"]
+    assert DFaustDataModule(root=str(tmp_path)).name == "50002/hips/hips.000380"
+
+
+@pytest.mark.parametrize(("shift", "together"), [(1e-6, True), (0.004, True), (0.03, False)])
+def test_rounding_is_no_other_frame(tmp_path, shift, together):
+    truth = ball(3000, radius=0.5)
+    cloud(tmp_path / "srb/ground_truth/anchor.xyz", truth)
+    cloud(tmp_path / "srb/scans/anchor.ply", truth[:2000] + [shift, 0, 0])
+    if together:
+        assert SRBDataModule("anchor", str(tmp_path)).reference.points.shape == (3000, 3)
+    else:
+        assert "scaling by" in failure(lambda: SRBDataModule("anchor", str(tmp_path)))
+
+
 def test_kitti_by_frame_number(tmp_path):
     path = tmp_path / "kitti/object/training/velodyne/000007.bin"
     path.parent.mkdir(parents=True)

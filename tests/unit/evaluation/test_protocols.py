@@ -69,7 +69,7 @@ def test_sbp_is_both_directions_in_the_sphere_of_the_clean_cloud(ball):
     assert result.values["p2m"] == pytest.approx(result.values["p2m_forward"] + result.values["p2m_backward"])
 
 
-@pytest.mark.parametrize("name", [name for name in PAPER if name != "scene3d"])
+@pytest.mark.parametrize("name", ["onet", "sap", "sbp"])
 def test_numbers_do_not_depend_on_the_units_of_the_files(ball, name):
     mesh, clean, _ = ball
     wrong = trimesh.Trimesh(np.asarray(mesh.vertices) * 1.05, mesh.faces, process=False)
@@ -82,12 +82,78 @@ def test_numbers_do_not_depend_on_the_units_of_the_files(ball, name):
     assert there.values == pytest.approx(here.values, rel=1e-7)
 
 
-def test_scene3d_is_in_metres(ball):
+@pytest.mark.parametrize(
+    ("name", "metric", "power"),
+    [("scene3d", "cd_mean1", 1), ("p2s", "cd_sum1", 1), ("p2s", "cd_p2s", 1), ("neuralpull", "cd_mean2", 2)],
+)
+def test_some_protocols_measure_in_the_units_of_the_files(ball, name, metric, power):
+    """Their scripts sample the stored meshes as they are."""
     mesh, _, _ = ball
-    protocol = small("scene3d")
-    here = protocol.evaluate(mesh, reference_of(mesh)).values["cd_mean1"]
+    protocol = small(name)
+    here = protocol.evaluate(mesh, reference_of(mesh)).values[metric]
     large = trimesh.Trimesh(np.asarray(mesh.vertices) * 5, mesh.faces, process=False)
-    assert protocol.evaluate(large, reference_of(mesh, None, 5.0)).values["cd_mean1"] == pytest.approx(5 * here)
+    there = protocol.evaluate(large, reference_of(mesh, None, 5.0)).values[metric]
+    assert there == pytest.approx(5**power * here)
+
+
+def test_turning_a_shape_changes_no_number_of_points2surf():
+    """The stored meshes are turned: an axis-aligned box would make the same shape smaller by up to a third."""
+    truth = trimesh.creation.box((1.0, 0.6, 0.3)).subdivide_loop(0)
+    wrong = truth.copy().apply_scale(1.05)
+    turn = trimesh.transformations.rotation_matrix(0.7, (1, 1, 0.3))
+    here, there = (
+        {name: small(name, 4000).evaluate(mesh, reference_of(mesh=known)).values for name in ("p2s", "neuralpull")}
+        for mesh, known in ((wrong, truth), (wrong.copy().apply_transform(turn), truth.copy().apply_transform(turn)))
+    )
+    assert there["p2s"]["cd_sum1"] == pytest.approx(here["p2s"]["cd_sum1"], rel=1e-6)
+    assert there["neuralpull"]["cd_mean2"] == pytest.approx(here["neuralpull"]["cd_mean2"], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("scale", "shift", "told"),
+    [
+        (1.0, 0.0, None),
+        (100.0, 0.0, "the prediction has another size or place than the reference (longest edges 19"),
+        (0.01, 0.0, "the prediction has another size or place"),
+        (1.05, 0.0, "scaled by 0.9"),
+        (1.0, 0.1, "scaled by"),
+        (1.0, 1.1, "another size or place"),
+    ],
+)
+def test_a_prediction_in_another_frame_is_noted(ball, scale, shift, told):
+    mesh, clean, noisy = ball
+    notes = load_protocol("sbp").evaluate(clean * scale + shift, reference_of(mesh, clean), noisy).notes
+    assert [told in note and "in the same coordinates" in note for note in notes] == ([True] if told else [])
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.03, 0.1])
+def test_noise_is_no_other_frame(ball, noise):
+    mesh, clean, _ = ball
+    noisy = clean + noise * np.random.default_rng(1).standard_normal(clean.shape)
+    assert load_protocol("sbp").evaluate(noisy, reference_of(mesh, clean), noisy).notes == []
+
+
+def test_the_other_files_are_looked_at_as_well(ball):
+    mesh, clean, noisy = ball
+    moved = Reference(clean * 1.2, None, np.asarray(mesh.vertices), np.asarray(mesh.faces))
+    assert any(note.startswith("scaled by") and "reference cloud" in note for note in evaluate_notes(clean, moved))
+    assert any("the noisy cloud" in note for note in evaluate_notes(clean, reference_of(mesh, clean), noisy * 3))
+
+
+def evaluate_notes(prediction, reference, noisy=None):
+    return load_protocol("sbp").evaluate(prediction, reference, noisy).notes
+
+
+def test_what_lies_wholly_beside_the_reference_is_refused(ball):
+    mesh, clean, noisy = ball
+    away = mesh.copy().apply_translation((2.5, 0, 0))
+    for name, given in (
+        ("prediction", (clean + [0, 0, 3], reference_of(mesh, clean))),
+        ("noisy cloud", (clean, reference_of(mesh, clean), noisy - 30)),
+        ("reference cloud", (np.asarray(away.vertices), reference_of(away, clean))),
+    ):
+        with pytest.raises(InputError, match=f"the {name} lies beside the reference, .*in the same coordinates"):
+            load_protocol("sbp").evaluate(*given)
 
 
 @pytest.mark.parametrize("name", PAPER)
@@ -195,7 +261,7 @@ def test_scene3d_is_measured_without_and_with_the_crop(ball):
     assert f"the crop keeps {len(mesh.faces):,} of {len(away.faces):,} faces" in result.notes
     assert protocol.evaluate(away, reference_of(mesh)).blanks["nc_cropped"] == "no input cloud given"
     assert protocol.evaluate(clean, reference_of(mesh), clean).blanks["nc_cropped"] == "only a mesh is cropped"
-    gone = mesh.copy().apply_translation((50, 0, 0))
+    gone = trimesh.creation.icosphere(radius=0.1)
     assert "no face lies within" in protocol.evaluate(gone, reference_of(mesh), clean).blanks["cd_mean2_cropped"]
 
 

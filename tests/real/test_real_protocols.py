@@ -77,6 +77,7 @@ FLOORS = {
 @pytest.mark.parametrize("name", FLOORS)
 def test_the_true_mesh_reaches_the_known_floors(shape, name):
     vertices, faces = shape(name)
+    vertices = vertices / np.ptp(vertices, axis=0).max()
     l1, nc, inflated, l2, sum1 = FLOORS[name]
     mesh, truth = trimesh.Trimesh(vertices, faces, process=False), Reference(vertices=vertices, faces=faces)
     onet = load_protocol("onet").evaluate(mesh, truth)
@@ -108,3 +109,21 @@ def test_denoising_has_the_known_floors(shape, name):
     assert result.printed("cd_sum2") == pytest.approx(nothing, rel=0.03)
     assert result.printed("cd_sum2", result.floors["oracle"]["cd_sum2"]) == pytest.approx(oracle, rel=0.03)
     assert result.printed("cd_sum2", result.floors["resample"]["cd_sum2"]) == pytest.approx(resample, rel=0.03)
+
+
+def test_abc_is_measured_in_the_stored_unit(data):
+    """The original meshes have longest edge 1; the stored ones are turned, and their axis-aligned boxes are larger."""
+    boxes = []
+    for path in sorted((data / "abc_minimal/03_meshes").glob("*.ply")):
+        mesh = trimesh.load(path, process=False)
+        assert mesh.bounding_box_oriented.primitive.extents.max() == pytest.approx(1, abs=0.01)
+        boxes.append(np.ptp(mesh.vertices, axis=0).max())
+        wrong = mesh.copy().apply_translation((0, 0, 0.002))
+        truth = Reference(vertices=np.asarray(mesh.vertices), faces=np.asarray(mesh.faces))
+        l2 = load_protocol("neuralpull").evaluate(wrong, truth).values["cd_mean2"]
+        (there, _), (back, _) = (trimesh.sample.sample_surface(m, 10_000, seed=s) for m, s in ((wrong, 11), (mesh, 12)))
+        expected = ((cKDTree(back).query(there)[0] ** 2).mean() + (cKDTree(there).query(back)[0] ** 2).mean()) / 2
+        assert l2 == pytest.approx(expected, rel=0.05)
+    if not boxes:
+        pytest.skip("no ABC meshes here")
+    assert min(boxes) > 1.1 and max(boxes) < 1.36
