@@ -35,7 +35,7 @@ SHAPES = {
 }
 
 
-def present(datamodule, root=None):
+def present(datamodule, variant=None, root=None):
     return SHAPES.get(datamodule, ["a", "b"]), None
 
 

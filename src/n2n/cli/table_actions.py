@@ -42,6 +42,10 @@ def plan(request: Request) -> int:
     _print_row("all, shared fits once", list(plan.jobs.values()), store, plan)
     for reason in sorted({cell.reason for cells in plan.wanted.values() for cell in cells if cell.reason}):
         print(f"blank: {reason}")
+    if plan.profile.datamodule is None:
+        partial = [cell for cells in plan.wanted.values() for cell in cells if cell.fits and not cell.whole]
+        for note in sorted({cell.notes[-1] for cell in partial if cell.notes}):
+            print(f"partial: {note}")
     print("\nnext: the same command with `run` in the place of `plan`")
     return 0
 

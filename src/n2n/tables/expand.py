@@ -15,7 +15,7 @@ COSTS = ("minutes", "memory", "seconds")
 _AXIS = re.compile(r"\{(\w+)\}")
 
 # Of a datamodule: names of the shapes present, and what is missing and where to get it.
-Present = Callable[[str], tuple[list[str], str | None]]
+Present = Callable[[str, str | None], tuple[list[str], str | None]]
 # Of one place on the axes: axis -> (label, value).
 Point = dict[str, tuple[str, Any]]
 
@@ -109,7 +109,10 @@ def _fits(spec: dict[str, Any], own: dict[str, Any], profile: Profile, present: 
     method = spec.get("method", "n2n")
     stand_in = profile.datamodule
     datamodule = stand_in or spec["datamodule"]
-    names, missing = present(datamodule)
+    texts = [*profile.settings, *own.get("settings", []), *spec.get("settings", [])]
+    settings = _settings([_fill(text, point, 1) for text in texts], profile)
+    variant = next((text.partition("=")[2] for text in settings if text.startswith("datamodule.variant=")), None)
+    names, missing = present(datamodule, variant)
     pattern = "*" if stand_in else _fill(spec.get("shapes", "*"), point, 1)
     names = [name for name in names if fnmatch(name, pattern)]
     if not names:
@@ -119,9 +122,8 @@ def _fits(spec: dict[str, Any], own: dict[str, Any], profile: Profile, present: 
         names = [name for name in names if name in chosen]
         if not names:
             return _Fits([], f"{datamodule}: none of the shapes {', '.join(chosen)} is here")
+        missing = f"of {datamodule} only {', '.join(names)}: this profile's choice for ablations"
     names = names[: profile.shapes]
-    texts = [*profile.settings, *own.get("settings", []), *spec.get("settings", [])]
-    settings = _settings([_fill(text, point, 1) for text in texts], profile)
     notes = (missing,) if missing and not stand_in else ()
     whole = not (stand_in or missing or chosen or profile.shapes)
     return _Fits([Fit(method, datamodule, name, settings) for name in names], "", notes, whole)

@@ -68,6 +68,8 @@ def _value(wanted: Wanted, fit: Fit, store: Store, protocols: dict[str, str]) ->
         return None, "not measured yet"
     if record["status"] != "done":
         return None, f"failed: {record['error']}"
+    if blank := record["results"].get(wanted.evaluation, {}).get("blank"):
+        return None, blank
     if lacking(record, {wanted.evaluation: {wanted.floor} - {""}}, protocols):
         return None, "not measured yet by the present definition of the protocol"
     group, _, key = wanted.value.rpartition(".")
@@ -79,7 +81,7 @@ def _value(wanted: Wanted, fit: Fit, store: Store, protocols: dict[str, str]) ->
     if value is not None:
         return value, ""
     blanks = result["blanks"]
-    reason = result.get("blank") or blanks.get(group or key) or blanks.get(key)
+    reason = blanks.get(group or key) or blanks.get(key)
     return None, reason or f"{wanted.evaluation} does not measure {wanted.value}"
 
 

@@ -100,13 +100,14 @@ def make_plan(names: Sequence[str], profile: Profile, root: str | None = None, f
     return plan
 
 
-def shapes_present(datamodule: str, root: str | None = None) -> tuple[list[str], str | None]:
-    """Return the shapes of a dataset that are at hand, and what is missing and where to get it."""
+def shapes_present(datamodule: str, variant: str | None, root: str | None = None) -> tuple[list[str], str | None]:
+    """Return the shapes of a dataset, or of a variant of it, at hand, and what is missing and where to get it."""
     component: Any = DATAMODULES.get(datamodule)
     if not hasattr(component, "names"):
         raise ConfigError(f"datamodule {datamodule!r} knows no true surface; tables need a BenchmarkDataModule")
     try:
-        return component.names(root), component.missing(root)
+        chosen = {"variant": variant} if variant else {}
+        return component.names(root, **chosen), component.missing(root, **chosen)
     except N2NError as error:
         return [], str(error)
 
@@ -122,8 +123,8 @@ def estimate(job: Job, gpu: bool = False) -> float:
     tasks = 1.0 * len(job.evaluations)
     if settings.get("recipe", "fast") == "paper":
         return as_number(settings.get("iterations", ""), 800_000) * costs["paper_step"] * _load(settings) + tasks
-    seen = min(points * observations, 16 * 32_768)
-    return costs["start"] + costs["per_point"] * seen + tasks
+    total = points * observations
+    return costs["start"] + costs["per_point"] * min(total, 50_000) + costs["per_input"] * total + tasks
 
 
 def _load(settings: dict[str, str]) -> float:
@@ -133,10 +134,11 @@ def _load(settings: dict[str, str]) -> float:
     return max(1.0, 0.5 * batch + 0.002 * batch**2.5)
 
 
-# Seconds, measured on 2 cores without a GPU and on one H100 (docs/results.md names commands and machines).
+# Seconds. On 2 cores without a GPU: fits of `n2n tables run` (10K: 8 s, 50K: 16 s, 200 x 10K: 36 s). On one H100,
+# 16 cores: `make bench BENCH=gpu`; its steps of the paper's recipe with 15 fits at a time (docs/experiments.md).
 _COSTS: dict[str, dict[str, float]] = {
-    "cpu": {"start": 9.0, "per_point": 1.5e-4, "paper_step": 0.05},
-    "gpu": {"start": 3.5, "per_point": 3e-5, "paper_step": 0.006},
+    "cpu": {"start": 6.0, "per_point": 2e-4, "per_input": 1e-5, "paper_step": 0.2},
+    "gpu": {"start": 3.5, "per_point": 3e-5, "per_input": 1e-5, "paper_step": 0.02},
 }
 
 

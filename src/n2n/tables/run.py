@@ -36,8 +36,11 @@ def run(plan: Plan, store: Store, workers: int, again: bool = False, told: Told 
     failures: list[tuple[Job, str]] = []
 
     def finish(job: Job, record: Record) -> None:
-        store.write(job.fit, record)
         error = record.get("error", "")
+        before = store.read(job.fit)
+        # A failure never replaces numbers.
+        if not error or before is None or before["status"] != "done":
+            store.write(job.fit, record)
         if error:
             failures.append((job, error))
         if told:

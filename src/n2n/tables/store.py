@@ -14,9 +14,10 @@ from n2n.evaluation.options import load_option
 from n2n.formats import atomic_path
 from n2n.tables.spec import Fit
 
-# What decides a number. Tables, pictures and commands do not: their changes leave results valid.
+# What decides a number. Data is known by its content, which the hash of the configuration holds; tables, pictures and
+# commands change no number.
 _DECIDING = (
-    "architectures", "baselines", "datamodules", "evaluation", "fitting", "geometry", "losses", "metrics", "tasks",
+    "architectures", "baselines", "evaluation", "fitting", "geometry", "losses", "metrics", "tasks",
     "transport", "config.py",
 )  # fmt: skip
 _NOT_DECIDING = {"table", "profile", "protocol", "logger", "experiment", "debug"}
@@ -89,7 +90,10 @@ def lacking(
 
 
 def _holds(result: dict[str, Any] | None, floors: Set[str], definition: str) -> bool:
-    return result is not None and result["definition"] == definition and floors <= set(result["asked"])
+    """Tell whether a result is what is wanted now; one that was blank for want of a truth is asked for again."""
+    if result is None or "blank" in result:
+        return False
+    return result["definition"] == definition and floors <= set(result["asked"])
 
 
 @functools.cache

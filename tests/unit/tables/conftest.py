@@ -42,6 +42,7 @@ def cells(write_table):
 
     def expanded(experiment=None, profile=None, present=None, **changes):
         (table,) = load_tables(["mine"], write_table(experiment=experiment, **changes))
-        return expand(table, profile or Profile("p", "a profile"), present or (lambda name: (["cow", "duck"], None)))
+        here = present or (lambda name, variant: (["cow", "duck"], None))
+        return expand(table, profile or Profile("p", "a profile"), here)
 
     return expanded

@@ -16,7 +16,7 @@ PROFILE = Profile("p", "a profile", ["recipe=fast"])
 @pytest.fixture(autouse=True)
 def shapes(monkeypatch):
     """Two shapes of every dataset, whatever lies on this machine."""
-    monkeypatch.setattr(module, "shapes_present", lambda name, root=None: (["cow", "duck"], None))
+    monkeypatch.setattr(module, "shapes_present", lambda name, variant, root=None: (["cow", "duck"], None))
 
 
 def done(plan, fit, sources="now"):
@@ -88,9 +88,9 @@ def test_what_other_sources_have_measured_is_told_apart(tmp_path, monkeypatch):
 def test_a_datamodule_without_a_truth_is_refused(monkeypatch):
     monkeypatch.undo()
     with pytest.raises(ConfigError, match="datamodule 'files' knows no true surface"):
-        module.shapes_present("files")
+        module.shapes_present("files", None)
     with pytest.raises(ConfigError, match=r"Unknown datamodule 'puu'. Did you mean 'pu'\?"):
-        module.shapes_present("puu")
+        module.shapes_present("puu", None)
 
 
 def test_without_data_every_cell_says_what_is_missing(monkeypatch, tmp_path):
@@ -99,7 +99,7 @@ def test_without_data_every_cell_says_what_is_missing(monkeypatch, tmp_path):
     assert plan.jobs == {}
     reasons = {cell.reason for cells in plan.wanted.values() for cell in cells}
     assert all("n2n data fetch" in reason or "not in this profile" in reason for reason in reasons)
-    assert plan.wanted["T10_observations"][0].reason == module.shapes_present("pu", str(tmp_path))[1]
+    assert plan.wanted["T10_observations"][0].reason == module.shapes_present("pu", None, str(tmp_path))[1]
 
 
 def test_more_work_is_estimated_longer():

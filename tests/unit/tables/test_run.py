@@ -114,3 +114,11 @@ def test_processes_share_the_cores(plan, tmp_path, monkeypatch):
     module.run(wanted, store, 3)
     assert store.read(next(iter(wanted.jobs)))["threads"] == "2"
     assert os.environ.get("OMP_NUM_THREADS") == before
+
+
+def test_a_failed_repetition_keeps_the_numbers(plan, tmp_path):
+    wanted, store = plan("fails"), Store(tmp_path)
+    good = {"status": "done", "results": {}, "cost": {}, "made": {"sources": "older"}}
+    store.write(next(iter(wanted.jobs)), good)
+    assert len(module.run(wanted, store, 1, again=True)) == 1
+    assert store.read(next(iter(wanted.jobs))) == good

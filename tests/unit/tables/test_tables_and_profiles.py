@@ -157,15 +157,15 @@ def test_generated_shapes_stand_in_for_every_dataset(cells):
     profile = Profile("p", "", datamodule="generated", keep=["datamodule.noise"], shapes=1)
     present = {"generated": (["ball", "cube"], None)}
     changed = {"shapes": "duck", "settings": ["datamodule.variant=x datamodule.noise={noise}"]}
-    first = cells(changed, profile, present.__getitem__, profiles={"p": {"shapes": ["pig"]}})[0]
+    first = cells(changed, profile, lambda name, variant: present[name], profiles={"p": {"shapes": ["pig"]}})[0]
     assert first.fits == [Fit("n2n", "generated", "ball", ("datamodule.noise=0.01",))]
     assert not first.whole and first.notes == []
 
 
 def test_what_is_missing_is_said_in_the_datamodules_words(cells):
     missing = "PU meshes not present: duck; get it with `n2n data fetch pu`"
-    assert cells(present=lambda name: ([], missing))[0].reason == missing
-    partly = cells(present=lambda name: (["cow"], missing))[0]
+    assert cells(present=lambda name, variant: ([], missing))[0].reason == missing
+    partly = cells(present=lambda name, variant: (["cow"], missing))[0]
     assert partly.notes == [missing] and partly.reason == "" and not partly.whole and len(partly.fits) == 1
     assert cells({"shapes": "pig*"})[0].reason == "pu: no shape pig* is here"
     own = {"p": {"shapes": ["pig", "elk"]}}
@@ -206,3 +206,14 @@ def test_a_fit_is_named_by_what_it_is_made_of():
     assert len({fit.id, Fit("n2n", "pu", "duck", ("a=1",)).id, *(other.id for other in others)}) == 5
     # Results on disk are found by it, so it must never change.
     assert fit.id == "5c50a8236b23"
+
+
+def test_each_variant_of_a_dataset_has_its_own_shapes(cells):
+    """ABC, its noisier copy and its training shapes are three lists."""
+    present = {"abc": ["cube"], "abc_minimal": ["ring", "rod"]}
+    spec = {
+        "settings": ["datamodule.variant={variant}"],
+        "axes": {"variant": {"A": "abc", "B": "abc_minimal"}, "noise": {"1%": 0.01}},
+    }
+    found = cells(spec, present=lambda name, variant: (present[variant], None))
+    assert [[fit.shape for fit in cell.fits] for cell in found] == [["cube"], ["ring", "rod"]]

@@ -14,7 +14,7 @@ from n2n.tables.write import write_tables
 
 @pytest.fixture
 def plan(monkeypatch, write_table):
-    monkeypatch.setattr(planning, "shapes_present", lambda name, root=None: (["duck"], None))
+    monkeypatch.setattr(planning, "shapes_present", lambda name, variant, root=None: (["duck"], None))
     return make_plan(["T10", "mine"], Profile("p", "a profile"), folder=write_table())
 
 
