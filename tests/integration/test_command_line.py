@@ -198,7 +198,10 @@ BAD_REQUESTS = [
     ((*MESH, "-x"), "n2n reconstruct does not know the argument '-x'"),
     (("doctor", "scan.xyz"), "n2n doctor does not know the argument 'scan.xyz'"),
     (("reconstrcut", "scan.xyz"), "Unknown command 'reconstrcut'. Did you mean 'reconstruct'?"),
-    ((), "no command given; choose one of: reconstruct, denoise, upsample, fit, demo, list, doctor"),
+    (
+        (),
+        "no command given; choose one of: reconstruct, denoise, upsample, fit, evaluate, data, tables, figure, demo, list, doctor",
+    ),
     (("list", "distanse"), "Unknown kind 'distanse'. Did you mean 'distance'?"),
     # Runs.
     (("reconstruct", "--run", ".", "-o", "out.ply"), ". holds no finished run (field.ckpt is missing)"),
@@ -642,7 +645,8 @@ def test_list_names_every_kind_or_one(n2n):
     code, out, error = n2n("list")
     assert code == 0 and error == ""
     kinds = [line[:-1] for line in out.splitlines() if not line.startswith(" ")]
-    assert kinds == ["architecture", "distance", "pairing", "regulariser", "datamodule", "metric"]
+    swapped = ["architecture", "distance", "pairing", "regulariser", "datamodule", "metric"]
+    assert kinds == [*swapped, "protocol", "baseline"]
     assert "  emd                  earth mover's distance" in out
     for kind in ("distance", "distances"):
         code, one, _ = n2n("list", kind)

@@ -9,7 +9,7 @@ import pytest
 
 @pytest.fixture(scope="session")
 def data():
-    folder = Path(os.environ.get("N2N_DATA", "../shared/data"))
+    folder = Path(os.environ.get("N2N_DATA", "../shared/data")).resolve()
     if not folder.is_dir():
         pytest.skip(f"no real data in {folder}; set N2N_DATA")
     return folder
