@@ -200,7 +200,8 @@ BAD_REQUESTS = [
     (("reconstrcut", "scan.xyz"), "Unknown command 'reconstrcut'. Did you mean 'reconstruct'?"),
     (
         (),
-        "no command given; choose one of: reconstruct, denoise, upsample, fit, evaluate, data, tables, figure, demo, list, doctor",
+        "no command given; choose one of: reconstruct, denoise, upsample, fit, evaluate, data, tables, figure, demo, "
+        "list, doctor",
     ),
     (("list", "distanse"), "Unknown kind 'distanse'. Did you mean 'distance'?"),
     # Runs.
