@@ -207,6 +207,6 @@ def test_patterns_of_shapes_find_shapes():
 def test_a_profile_says_nothing_unknown(tmp_path, monkeypatch):
     (tmp_path / "profile").mkdir()
     (tmp_path / "profile" / "mine.yaml").write_text("title: mine\nshape: 3\n")
-    monkeypatch.setattr("n2n.tables.spec.conf_dir", lambda: tmp_path)
+    monkeypatch.setattr("n2n.evaluation.options.conf_dir", lambda: tmp_path)
     with pytest.raises(ConfigError, match=r"mine.yaml: Unknown key 'shape'. Did you mean 'shapes'\?"):
         load_profile("mine")

@@ -17,7 +17,7 @@ def load_option(group: str, name: str) -> dict[str, Any]:
     """
     from omegaconf import OmegaConf
 
-    found = _options(group)
+    found = find_options(group)
     if name not in found:
         raise ConfigError(f"Unknown {group} {name!r}.{suggest(name, list(found))}")
     try:
@@ -27,11 +27,11 @@ def load_option(group: str, name: str) -> dict[str, Any]:
         raise ConfigError(f"{found[name]}: is not readable YAML ({reason})") from error
 
 
-def _options(group: str) -> dict[str, Any]:
+def find_options(group: str) -> dict[str, Any]:
     """Return option -> file; ours win over a plugin's of the same name."""
     folders = [files(point.value) / group for point in entry_points(group=CONF_PLUGINS)]
     found = {}
     for folder in [*folders, conf_dir() / group]:
         if folder.is_dir():
             found |= {file.name[:-5]: file for file in folder.iterdir() if file.name.endswith(".yaml")}
-    return found
+    return dict(sorted(found.items()))

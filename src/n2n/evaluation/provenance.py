@@ -9,15 +9,18 @@ import n2n
 
 
 @cache
-def provenance() -> dict[str, Any]:
-    """Return version and, where n2n runs from its own checkout, commit and whether files differ from it."""
+def provenance(paths: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Return version and, where n2n runs from its own checkout, commit and whether files differ from it.
+
+    Args:
+        paths: Files that count; empty: all that are tracked.
+    """
     facts: dict[str, Any] = {"n2n": n2n.__version__, "commit": None, "modified": None}
     root = Path(n2n.__file__).parents[2]
     # An installed n2n may lie in the repository of something else.
     if (root / ".git").exists() and (root / "src" / "n2n").is_dir():
-        commit, changes = (
-            _git(root, *arguments) for arguments in (("rev-parse", "HEAD"), ("status", "--porcelain", "-uno"))
-        )
+        counted = ("--", *paths) if paths else ("-uno",)
+        commit, changes = _git(root, "rev-parse", "HEAD"), _git(root, "status", "--porcelain", *counted)
         if commit:
             facts |= {"commit": commit, "modified": bool(changes)}
     return facts

@@ -4,19 +4,17 @@ import dataclasses
 import datetime
 import os
 import platform
-import subprocess
 import time
 from collections.abc import Mapping, Set
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-import n2n
 from n2n.compose import compose, config_hash
 from n2n.datamodules.benchmark import BenchmarkDataModule
 from n2n.errors import ConfigError, N2NError
 from n2n.evaluation.protocol import Protocol, load_protocol
+from n2n.evaluation.provenance import provenance
 from n2n.fitting.fit import fit as fit_data
 from n2n.registry import BASELINES, DATAMODULES
 from n2n.tables.memory import peak, reset_peak
@@ -135,24 +133,12 @@ def _made() -> dict[str, Any]:
     import torch
 
     gpu = torch.cuda.get_device_name() if torch.cuda.is_available() else None
+    origin = provenance(tuple(map(str, deciding())))
     return {
-        "n2n": n2n.__version__,
-        "commit": os.environ.get("N2N_COMMIT") or commit(),
+        "n2n": origin["n2n"],
+        "commit": f"{origin['commit'][:7]}{'+' if origin['modified'] else ''}" if origin["commit"] else "unknown",
         "sources": sources(),
         "torch": torch.__version__,
         "machine": f"{platform.machine()}, {os.cpu_count()} cores" + (f", {gpu}" if gpu else ""),
         "date": datetime.datetime.now().astimezone().isoformat(timespec="seconds"),
     }
-
-
-def commit() -> str:
-    """Return the commit of a checkout, `+` where files that decide a number were changed since; `unknown` elsewhere."""
-    here = Path(__file__).parent
-    try:
-        name, changes = (
-            subprocess.run(["git", "-C", here, *command], capture_output=True, text=True, check=True).stdout.strip()
-            for command in (["rev-parse", "--short", "HEAD"], ["status", "--porcelain", "--", *map(str, deciding())])
-        )
-    except (OSError, subprocess.CalledProcessError):
-        return "unknown"
-    return f"{name}+" if changes else name

@@ -4,15 +4,14 @@ import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from importlib.metadata import entry_points
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from n2n.compose import CONF_PLUGINS, conf_dir
+from n2n.compose import conf_dir
 from n2n.errors import ConfigError
+from n2n.evaluation.options import find_options
 from n2n.registry import suggest
 from n2n.tables.check import check_profile, check_table
 
@@ -138,7 +137,7 @@ def load_tables(names: Sequence[str] = (), folder: Path | None = None) -> list[T
         ConfigError: Unknown name, or a table that says what no table may say.
     """
     tables = []
-    for name, path in {**_options("table"), **own_tables(folder)}.items():
+    for name, path in {**find_options("table"), **own_tables(folder)}.items():
         spec = _read(path)
         check_table(str(path), spec)
         tables.append(Table(name, spec))
@@ -167,29 +166,19 @@ def own_tables(folder: Path | None) -> dict[str, Path]:
     found = {path.stem: path for path in sorted(folder.glob("*.yaml"))}
     if not found:
         raise ConfigError(f"{folder}: no table found there; a table is a file *.yaml like those of {conf_dir()}/table")
-    for name in sorted(found.keys() & _options("table").keys()):
+    for name in sorted(found.keys() & find_options("table").keys()):
         raise ConfigError(f"{found[name]}: a table {name!r} exists already; give yours another name")
     return found
 
 
 def load_profile(name: str) -> Profile:
     """Read a profile of conf/profile, or of an installed package."""
-    known = _options("profile")
+    known = find_options("profile")
     if name not in known:
         raise ConfigError(f"Unknown profile {name!r}.{suggest(name, list(known))}")
     spec = _read(known[name])
     check_profile(str(known[name]), spec)
     return Profile(name, **spec)
-
-
-def _options(group: str) -> dict[str, Any]:
-    """Return option -> file; ours win over a plugin's of the same name."""
-    folders = [files(point.value) / group for point in entry_points(group=CONF_PLUGINS)]
-    found = {}
-    for folder in [*folders, conf_dir() / group]:
-        if folder.is_dir():
-            found |= {file.name[:-5]: file for file in folder.iterdir() if file.name.endswith(".yaml")}
-    return dict(sorted(found.items()))
 
 
 def _match(name: str, known: list[str]) -> str:

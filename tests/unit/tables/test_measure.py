@@ -1,7 +1,6 @@
 """One fit measured: what a record holds, and that a failure is one, too."""
 
 import json
-import subprocess
 
 import numpy as np
 import pytest
@@ -10,7 +9,7 @@ from n2n import registry
 from n2n.evaluation.protocol import load_protocol
 from n2n.geometry.reference import Reference
 from n2n.tables import measure as module
-from n2n.tables.measure import commit, measure
+from n2n.tables.measure import measure
 from n2n.tables.memory import peak, reset_peak
 from n2n.tables.spec import Fit
 from n2n.tables.store import lacking, protocol_hash
@@ -109,18 +108,14 @@ def test_without_a_truth_nothing_is_fitted_unless_its_cost_counts(still, monkeyp
     assert built == [1] and record["cost"]["minutes"] >= 0 and "blank" in record["results"]["denoise/sbp"]
 
 
-def test_the_commit_of_a_checkout(monkeypatch):
-    def git(command, **_):
-        out = "abc1234\n" if "rev-parse" in command else changes
-        return subprocess.CompletedProcess(command, 0, out, "")
-
-    monkeypatch.setattr(subprocess, "run", git)
-    changes = ""
-    assert commit() == "abc1234"
-    changes = " M src/n2n/fitting/fit.py\n"
-    assert commit() == "abc1234+"
-    monkeypatch.setattr(subprocess, "run", lambda *a, **k: (_ for _ in ()).throw(FileNotFoundError("git")))
-    assert commit() == "unknown"
+@pytest.mark.parametrize(
+    ("commit", "modified", "expected"),
+    [("abc1234def", False, "abc1234"), ("abc1234def", True, "abc1234+"), (None, None, "unknown")],
+)
+def test_a_record_names_its_commit(still, monkeypatch, commit, modified, expected):
+    facts = {"n2n": "1.0", "commit": commit, "modified": modified}
+    monkeypatch.setattr("n2n.tables.measure.provenance", lambda paths: facts)
+    assert measure(still, {"denoise/sbp": set()})["made"]["commit"] == expected
 
 
 def test_the_peak_of_memory_sees_what_is_held_and_given_back():

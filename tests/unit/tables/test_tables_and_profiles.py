@@ -5,7 +5,6 @@ from importlib.metadata import EntryPoint
 import pytest
 
 from n2n.errors import ConfigError
-from n2n.tables import spec
 from n2n.tables.spec import Fit, Profile, load_profile, load_tables
 
 
@@ -100,7 +99,9 @@ def test_an_installed_package_adds_tables_and_profiles(write_table, tmp_path, mo
     (package / "profile" / "night.yaml").write_text("title: over night\nsettings: [recipe=fast, iterations=480]\n")
     (package / "profile" / "paper.yaml").write_text("title: not ours\n")
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(spec, "entry_points", lambda group: [EntryPoint("theirs", "table_plugin", group)])
+    monkeypatch.setattr(
+        "n2n.evaluation.options.entry_points", lambda group: [EntryPoint("theirs", "table_plugin", group)]
+    )
     assert [table.title for table in load_tables(["theirs"])] == ["a table"]
     assert load_profile("night") == Profile("night", "over night", ["recipe=fast", "iterations=480"])
     assert load_profile("paper").title != "not ours"
