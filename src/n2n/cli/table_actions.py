@@ -67,7 +67,10 @@ def run(request: Request) -> int:
             if error:
                 say(f"failed: {_described(job)}: {error}")
 
-        failures = run_plan(plan, store, request.workers, request.again, told)
+        try:
+            failures = run_plan(plan, store, request.workers, request.again, told)
+        except KeyboardInterrupt as stop:
+            raise KeyboardInterrupt("what was measured is kept; the same command goes on") from stop
     say(f"tables: {total - len(failures)} of {total} fits measured -> {store.folder}")
     render(request)
     return 2 if failures else 0
