@@ -6,7 +6,7 @@ from n2n.errors import ConfigError
 from n2n.registry import suggest
 
 _TABLE = {
-    "title": str, "published": str, "competitors": str, "higher": list, "unfair": list, "experiments": list,
+    "title": str, "published": str, "competitors": str, "unfair": list, "experiments": list,
     "footnotes": list, "derived": list, "profiles": dict,
 }  # fmt: skip
 _EXPERIMENT = {

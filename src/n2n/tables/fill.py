@@ -124,8 +124,7 @@ def _mark_best(grid: Grid, spec: dict[str, Any]) -> None:
     for (row, column), cell in grid.cells.items():
         others = rivals.get(place(row, column), [])
         if cell.origin == OURS and len(others) > 1 and any(cell is other for other in others):
-            high = cell.higher or {*row.split("/"), *column.split("/")} & set(spec.get("higher", []))
-            cell.bold = cell.value == (max if high else min)(other.value for other in others)
+            cell.bold = cell.value == (max if cell.higher else min)(other.value for other in others)
 
 
 def _group(label: str) -> str:

@@ -143,7 +143,6 @@ def test_best_among_the_rows_of_its_group(bench, paper):
     bench.wants("cow", row="PU/ours")
     assert marked(bench.grid(published="x", competitors="rows")) == {("PU/ours", "c")}
     assert marked(bench.grid(published="x")) == set()
-    assert marked(bench.grid(published="x", competitors="rows", higher=["c"])) == set()
     assert marked(bench.grid(published="x", competitors="rows", unfair=["ours"])) == set()
     assert marked(bench.grid(published="x", competitors="rows", unfair=["PU/A"])) == set()
 
@@ -155,7 +154,6 @@ def test_best_among_the_columns_of_its_group(bench, paper):
     # The 10K column is another competition.
     assert marked(bench.grid(published="x", competitors="columns", unfair=["B"])) == {("CD", "5K/ours")}
     assert marked(bench.grid(published="x", competitors="columns")) == set()
-    assert marked(bench.grid(published="x", competitors="columns", higher=["CD"], unfair=["A"])) == {("CD", "5K/ours")}
 
 
 def test_a_floor_and_a_part_of_the_data_compete_with_nothing(bench, paper):
