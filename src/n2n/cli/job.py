@@ -21,11 +21,13 @@ from n2n.tasks.field import FIELD_FILE, Field
 RUNS = Path("runs")
 
 
-def fit_job(config: dict[str, Any]) -> Path:
-    """Fit one configuration into runs/<hash of configuration and data>/, resuming what is there; return the folder.
+def fit_job(config: dict[str, Any], run_dir: Path | None = None, sweep: str | None = None) -> Path:
+    """Fit one configuration, resuming what is there; return the run folder.
 
     Args:
         config: As composed and validated.
+        run_dir: Where; None for runs/<hash of configuration and data>/.
+        sweep: Name of the sweep that the run belongs to.
 
     Raises:
         N2NError: The data or the configuration cannot be used, or the folder cannot be written.
@@ -33,7 +35,7 @@ def fit_job(config: dict[str, Any]) -> Path:
     pick_device(config["device"])
     data = _read_data(config)
     # The content of the files counts, not their names: a scan that was replaced is another run.
-    run_dir = RUNS / config_hash({**config, "data": data.fingerprint()})
+    run_dir = run_dir or RUNS / config_hash({**config, "data": data.fingerprint()})
     if (run_dir / FIELD_FILE).exists():
         say(f"fit: {run_dir} is finished already; delete it to fit again, or change a setting")
         return run_dir

@@ -1,0 +1,1 @@
+"""Dashboards of runs, from one definition."""

@@ -1,0 +1,1 @@
+"""Many fits: launched, claimed, watched, resumed."""

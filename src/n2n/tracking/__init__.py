@@ -1,0 +1,1 @@
+"""What a fit tells about itself: metrics, pictures, clouds."""
