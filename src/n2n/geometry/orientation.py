@@ -23,6 +23,9 @@ from torch import Tensor
 
 _PATIENCE = 20
 _GRAPH_NEIGHBOURS = 10
+_APART = 3.0  # weight of what tells two sheets from one
+_SHEET, _CURVED = 1.5, 0.25  # blurs, spacings; points closer than that along the normal are on one sheet
+_PATCH = 40  # points that flip as one at first
 
 
 def orient(
@@ -48,8 +51,13 @@ def orient(
     energy = dipole_energy(points, normals, areas, blur)
     graph = _neighbour_graph(points, normals)
     starts = [_spanning_tree_signs(graph, normals), _leading_eigenvector_signs(energy, generator)]
-    found = [_search(energy, signs, generator) for signs in starts]
-    best = max(found, key=lambda signs: float(signs @ (energy @ signs)))
+    patches = _patches(graph, normals)
+    between = torch.as_tensor(patches.T @ (patches.T @ energy.numpy()).T).fill_diagonal_(0)
+    found = []
+    for signs in starts:
+        majority = torch.as_tensor(np.where(patches.T @ signs.numpy() >= 0, np.float32(1), np.float32(-1)))
+        found.append(torch.as_tensor(patches @ _search(between, majority, generator).numpy()))
+    best = _search(energy, max(found, key=lambda signs: float(signs @ (energy @ signs))), generator)
     return _point_outwards(points, normals * best.numpy()[:, None], areas, graph)
 
 
@@ -58,25 +66,56 @@ def dipole_energy(
 ) -> Tensor:
     """Return the symmetric coupling matrix M, (n, n) float32, softened at the scale of point spacing and blur."""
     p, n, a = (torch.as_tensor(x, dtype=torch.float32) for x in (points, normals, areas))
-    squared = torch.cdist(p, p).square() + float(a.median()) + blur**2
+    softening = float(a.median()) + blur**2
+    squared = torch.cdist(p, p).square() + softening
     own = (p * n).sum(1)
     # (p_i - p_j) . n_i and (p_i - p_j) . n_j from matrix products instead of an (n, n, 3) array.
     along_i = own[:, None] - n @ p.T
     along_j = p @ n.T - own[None]
-    coupling = (n @ n.T - 3 * along_i * along_j / squared) / squared.pow(1.5)
+    parallel, offset = n @ n.T, along_i * along_j
+    apart = 1 - torch.exp(-offset.abs() / (2 * ((_SHEET * blur) ** 2 + _CURVED**2 * float(a.median()))))
+    offset = offset + _APART * softening * apart * parallel
+    coupling = (parallel - 3 * offset / squared) / squared.pow(1.5)
     coupling *= a[:, None] * a[None]
     coupling.fill_diagonal_(0)
     return coupling
 
 
 def _neighbour_graph(points: NDArray[np.float64], normals: NDArray[np.float64]) -> sparse.csr_matrix:
-    """Return the symmetric k-nearest-neighbour graph; small weights between parallel normals."""
+    """Return the symmetric k-nearest-neighbour graph; small weights between parallel normals of one sheet."""
     k = min(_GRAPH_NEIGHBOURS, len(points) - 1)
-    neighbour = cKDTree(points).query(points, k + 1)[1][:, 1:].ravel()
+    reach, neighbour = cKDTree(points).query(points, k + 1)
+    neighbour, reach = neighbour[:, 1:].ravel(), np.maximum(reach[:, 1:].ravel(), 1e-300)
     source = np.repeat(np.arange(len(points)), k)
-    weight = 1.001 - np.abs((normals[source] * normals[neighbour]).sum(axis=1))
+    along = points[neighbour] - points[source]
+    # A neighbour along the normal is on the other side of a wall.
+    across = sum(np.abs((along * normals[end]).sum(axis=1)) for end in (source, neighbour)) / (2 * reach)
+    weight = 1.001 - np.abs((normals[source] * normals[neighbour]).sum(axis=1)) + across
     graph = sparse.csr_matrix((weight, (source, neighbour)), shape=(len(points),) * 2)
     return graph.maximum(graph.T)
+
+
+def _patches(graph: sparse.csr_matrix, normals: NDArray[np.float64]) -> sparse.csr_matrix:
+    """Join neighbours, the most parallel first, into patches of a bounded size.
+
+    Returns:
+        (n, patches): the sign of each point relative to its patch, one entry a row.
+    """
+    edges = sparse.triu(graph).tocoo()
+    patch, sign = np.arange(len(normals)), np.ones(len(normals), np.float32)
+    members = [[point] for point in range(len(normals))]
+    for edge in np.argsort(edges.data):
+        i, j = edges.row[edge], edges.col[edge]
+        into, gone = patch[i], patch[j]
+        if into == gone or len(members[into]) + len(members[gone]) > _PATCH:
+            continue
+        agree = 1.0 if normals[i] @ normals[j] >= 0 else -1.0
+        sign[members[gone]] *= agree * sign[i] * sign[j]
+        patch[members[gone]] = into
+        members[into] += members[gone]
+        members[gone] = []
+    _, column = np.unique(patch, return_inverse=True)
+    return sparse.csr_matrix((sign, (np.arange(len(normals)), column)))
 
 
 def _spanning_tree_signs(graph: sparse.csr_matrix, normals: NDArray[np.float64]) -> Tensor:

@@ -17,6 +17,11 @@ _AREA_NEIGHBOURS = 9
 _FAR_POSITIONS = 20_000
 _OPEN = 0.3  # mean normal of a surface that is clearly not closed
 _LOWEST_OPEN, _LOWEST = 0.05, 0.4  # levels; far from everything is outside
+_SMALLEST_FIT = 24  # neighbours
+_ASKED = 6000  # positions where a scaffold must know inside from outside
+_OFF = 2.0  # noise deviations; closer to the data nothing is known, nor closer than samples are to each other
+_DECIDED = 0.25  # winding numbers closer than that to 0 or 1 are clear
+_CLEAR = 0.01  # share of unclear positions that needs no second scaffold
 _NEAR = 1.5  # sample spacings; closer than that a sample's plane says more than its distance
 
 
@@ -38,6 +43,10 @@ class Scaffold:
     def build(cls, cloud: NDArray[np.float64], scales: Scales, seed: int = 0) -> "Scaffold":
         """Thin the cloud evenly, project it onto local quadrics and orient the normals globally.
 
+        A local fit should be wider than the noise, but where walls or bars are thinner than it is wide, it mixes their
+        sides, and no orientation is right any more. That shows in the winding numbers, which then are neither 0 nor 1
+        in large parts of space; so narrower fits, whose normals are worse but whose sides are apart, are tried then.
+
         Args:
             cloud: (n, 3) noisy points, unit coordinates.
             scales: Their noise and spacing.
@@ -46,12 +55,33 @@ class Scaffold:
         generator = np.random.default_rng(seed)
         tree = cKDTree(cloud)
         samples = cloud[_thin(cloud, _MAX_POINTS, generator)]
+        asked = generator.uniform(cloud.min(axis=0), cloud.max(axis=0), (_ASKED, 3))
+        off = max(_OFF * scales.noise, np.sqrt(scales.area / len(samples)))
+        asked = asked[tree.query(asked)[0] > off]
         neighbours = max(2 * scales.patch if scales.patch < 48 else scales.patch, 32)
+        best = cls._fit(tree, samples, neighbours, scales.noise, seed)
+        unclear = best.unclear(asked)
+        while unclear > _CLEAR and neighbours > _SMALLEST_FIT:
+            neighbours = max(neighbours // 2, _SMALLEST_FIT)
+            narrower = cls._fit(tree, samples, neighbours, scales.noise, seed)
+            share = narrower.unclear(asked)
+            if share < unclear / 2:
+                best, unclear = narrower, share
+        return best
+
+    @classmethod
+    def _fit(cls, tree: cKDTree, samples: NDArray[np.float64], neighbours: int, noise: float, seed: int) -> "Scaffold":
         points, normals = project_to_quadric(tree, samples, neighbours)
         k = min(_AREA_NEIGHBOURS, len(points))
         reach = cKDTree(points).query(points, k)[0][:, -1]
         areas = np.pi * reach**2 / k
-        return cls(points, orient(points, normals, areas, scales.noise, seed), areas)
+        return cls(points, orient(points, normals, areas, noise, seed), areas)
+
+    def unclear(self, positions: NDArray[np.float64]) -> float:
+        """Return the share of positions whose winding number is neither about 0 nor about 1."""
+        winding = self.winding(positions)
+        off = np.minimum(np.abs(winding), np.abs(winding - 1))
+        return float((off > _DECIDED).mean()) if len(off) else 0.0
 
     def sign(self, queries: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return -1 where the winding number says inside and +1 elsewhere, (q,)."""
