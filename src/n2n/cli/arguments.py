@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from n2n import __version__
-from n2n.cli import data, evaluate, figure, tables
+from n2n.cli import dashboard, data, evaluate, figure, sweeps, tables
 from n2n.config import DEVICES, check_seed
 from n2n.errors import ConfigError
 from n2n.registry import suggest
@@ -66,7 +66,7 @@ def parser() -> argparse.ArgumentParser:
         _add_task(commands, task, summary, examples)
     fit = commands.add_parser("fit", help="fit a field and keep the run folder (the Hydra application)", add_help=False)
     fit.add_argument("overrides", nargs=argparse.REMAINDER)
-    for command in (evaluate, data, tables, figure):
+    for command in (sweeps, evaluate, data, tables, figure, dashboard):
         command.add(commands)
     demo = commands.add_parser("demo", help="see the main job on a bundled noisy scan")
     demo.add_argument("-o", "--output", default="out/demo", metavar="DIR", help="folder for the results (out/demo)")

@@ -17,13 +17,23 @@ def say(text: str, quiet: bool = False) -> None:
 
 
 @contextmanager
+def silenced() -> Iterator[None]:
+    """Say nothing and show no bar while the block runs: somebody else reports for many."""
+    before, _console.quiet = _console.quiet, True
+    try:
+        yield
+    finally:
+        _console.quiet = before
+
+
+@contextmanager
 def progress_bar(label: str, quiet: bool = False) -> Iterator[Report | None]:
     """Yield a function `report(done, total, values)` that moves one bar; None when quiet.
 
     Where standard error is a file or a pipe, only the label is printed, at the first report: what fails before there is
     progress leaves its error message alone on the screen.
     """
-    if quiet:
+    if quiet or _console.quiet:
         yield None
         return
     if not _console.is_terminal:

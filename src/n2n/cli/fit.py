@@ -1,13 +1,15 @@
-"""`n2n fit`: the Hydra application. Every run has a folder named by its configuration."""
+"""`n2n fit`: the Hydra application. Every run has a folder named by its configuration and data."""
 
 import sys
-from typing import Any, NamedTuple
+from typing import Any
 
 from n2n.compose import conf_dir, hydra_arguments, register_schema, validate
-from n2n.errors import N2NError
+from n2n.errors import ConfigError, N2NError
 from n2n.messages import unexpected
 
 _RESUMES = "the same command resumes the run"
+# Flags of Hydra that print something instead of fitting.
+_LOOKS = ("--cfg", "-c", "--info", "-i", "--hydra-help", "--shell-completion", "-sc", "--version")
 
 _HELP = """\
 usage: n2n fit [key=value ...] [-m] [--cfg job]
@@ -20,7 +22,7 @@ examples:
   n2n fit datamodule=files 'datamodule.paths=[scan.ply]'
   n2n fit datamodule=files 'datamodule.paths=[scan.ply]' recipe=paper distance=cd
   n2n fit terms.zero_level.weight=0.1      a further term of the loss; `n2n list regulariser` knows the names
-  n2n fit -m seed=0,1,2                    several runs, one after the other
+  n2n fit -m seed=0,1,2 sweep=seeds        a sweep: several runs at a time, in sweeps/seeds; see `n2n sweep --help`
   n2n fit --cfg job                        print the composed configuration
   n2n reconstruct --run runs/HASH -o mesh.ply
 
@@ -29,23 +31,37 @@ Composition and sweeps are Hydra's (hydra.cc); --hydra-help prints its own flags
 
 
 def run_fit(arguments: list[str]) -> int:
-    """Hand the command line to Hydra; each job is a fit of its own."""
+    """Fit one configuration, or with -m a sweep of them."""
     if {"--help", "-h"} & set(arguments):
         print(_HELP, end="")
         return 0
-    import hydra
-
-    from n2n.cli.sweep import check_flags, check_jobs, split_arguments
+    from n2n.sweeps.command import check_flags, check_jobs, is_sweep, split_arguments, take_name
 
     settings, flags = split_arguments(arguments)
     check_flags(flags)
-    check_jobs(settings, flags)
+    name, rest = take_name(settings)
+    check_jobs(rest, flags)
+    if is_sweep(settings, flags):
+        if looks := [flag for flag in flags if flag.partition("=")[0] in _LOOKS]:
+            raise ConfigError(f"{looks[0]} shows one configuration; leave -m out and give every setting one value")
+        from n2n.cli.multirun import run_multirun
+
+        return run_multirun(settings, flags)
+    if name:
+        raise ConfigError(f"sweep={name} names a sweep, and this is one fit; add -m, or leave it out")
+    return _run_one(rest, flags)
+
+
+def _run_one(settings: list[str], flags: list[str]) -> int:
+    """Hand the command line to Hydra, which fits, or prints what the flags ask for."""
+    import hydra
+
     register_schema()
-    outcomes: list[Outcome] = []
+    codes: list[int] = []
 
     @hydra.main(config_path=str(conf_dir()), config_name="config", version_base="1.3")
     def application(composed: Any) -> None:
-        outcomes.append(_run_job(composed))
+        codes.append(_fit(composed))
 
     previous = sys.argv
     sys.argv = ["n2n fit", *hydra_arguments(settings), *flags]
@@ -57,43 +73,18 @@ def run_fit(arguments: list[str]) -> int:
         return 2 if stop.code else 0
     finally:
         sys.argv = previous
-    return _report(outcomes)
+    return max(codes, default=0)
 
 
-class Outcome(NamedTuple):
-    """What became of a job: its exit code, and what to say about it where it failed."""
-
-    code: int
-    failure: str = ""
-
-
-def _run_job(composed: Any) -> Outcome:
-    """Run one job; a failure is told and remembered, and does not stop the rest of a sweep."""
-    from hydra.core.hydra_config import HydraConfig
-
-    from n2n.cli.console import say
+def _fit(composed: Any) -> int:
+    """Fit; tell a failure here, or Hydra would, in many lines."""
     from n2n.cli.job import fit_job
 
-    settings = " ".join(HydraConfig.get().overrides.task)
-    if HydraConfig.get().mode.name == "MULTIRUN":
-        say(f"job {HydraConfig.get().job.num}: {settings}")
     try:
         fit_job(validate(composed))
     except Exception as error:
         foreseen = isinstance(error, N2NError)
         message = str(error) if foreseen else unexpected(error)
         print("n2n: error:", message.replace("\n", " "), file=sys.stderr)
-        return Outcome(2 if foreseen else 3, f"{settings}: {message}")
-    return Outcome(0)
-
-
-def _report(outcomes: list[Outcome]) -> int:
-    """Sum up a sweep; return the worst exit code."""
-    from n2n.cli.console import say
-
-    failures = [outcome.failure for outcome in outcomes if outcome.code]
-    if len(outcomes) > 1:
-        say(f"fit: {len(outcomes) - len(failures)} of {len(outcomes)} jobs finished")
-        for failure in failures:
-            say(f"  failed: {failure}")
-    return max((outcome.code for outcome in outcomes), default=0)
+        return 2 if foreseen else 3
+    return 0

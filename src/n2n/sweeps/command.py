@@ -1,5 +1,6 @@
-"""Check every job of a `n2n fit` command line before the first one starts."""
+"""The command line of `n2n fit`: told apart, and every job of it checked before the first one starts."""
 
+import re
 from itertools import chain, islice, pairwise
 from typing import NoReturn
 
@@ -9,6 +10,8 @@ from n2n.messages import explain
 from n2n.registry import suggest
 
 _VALUES_PER_KEY = 20
+_NAME = re.compile(r"[\w][\w.-]*")
+_SWEEP, _MULTIRUN = "sweep=", "hydra.mode=MULTIRUN"
 # Flags of Hydra that take a value, and those after which conf/ is not what n2n ships.
 _WITH_VALUE = ("--cfg", "-c", "--package", "-p", "--info", "-i")
 _OTHER_CONF = ("--config-dir", "-cd", "--config-path", "-cp", "--config-name", "-cn")
@@ -24,9 +27,39 @@ def check_jobs(settings: list[str], flags: list[str]) -> None:
         return
     if any(setting.startswith("hydra.searchpath=") for setting in settings):
         return
-    is_sweep = any(flag in ("-m", "--multirun") for flag in flags)
-    for job in sweep_samples(settings) if is_sweep else [settings]:
+    for job in sweep_samples(settings) if is_sweep(settings, flags) else [settings]:
         compose(job)
+
+
+def is_sweep(settings: list[str], flags: list[str]) -> bool:
+    """Return whether a command line asks for several runs."""
+    return bool({"-m", "--multirun"} & set(flags)) or _MULTIRUN in settings
+
+
+def take_name(settings: list[str]) -> tuple[str | None, list[str]]:
+    """Take the sweep's name out of the settings: it says where runs are kept, and nothing about them.
+
+    >>> take_name(["seed=0,1", "sweep=seeds"])
+    ('seeds', ['seed=0,1'])
+
+    Raises:
+        ConfigError: It cannot be the name of a folder.
+    """
+    names = [text.removeprefix(_SWEEP) for text in settings if text.startswith(_SWEEP)]
+    if names and not _NAME.fullmatch(names[-1]):
+        raise ConfigError(f"sweep={names[-1]} is not a name; use letters, digits, dots, - and _, e.g. sweep=seeds")
+    return (names[-1] if names else None), [text for text in settings if not text.startswith(_SWEEP)]
+
+
+def is_about_launcher(setting: str) -> bool:
+    """Return whether a setting says how runs are started, not what they are.
+
+    >>> is_about_launcher("hydra/launcher=basic"), is_about_launcher("hydra.launcher.n_jobs=4")
+    (True, True)
+    >>> is_about_launcher("seed=1")
+    False
+    """
+    return setting.lstrip("+").startswith(("hydra/launcher=", "hydra.launcher."))
 
 
 def check_flags(flags: list[str]) -> None:

@@ -1,0 +1,81 @@
+"""One run of a sweep in a worker: of this machine or another."""
+
+import os
+import signal
+import threading
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from n2n.cli.console import silenced
+from n2n.compose import validate
+from n2n.errors import ConfigError
+from n2n.sweeps.attempt import attempt
+from n2n.sweeps.data import fingerprint
+from n2n.sweeps.grid import run_hash, varied
+from n2n.sweeps.score import score
+
+
+@dataclass(frozen=True)
+class SweepJob:
+    """What a worker does with a composed configuration; travels to it as a pickle.
+
+    Attributes:
+        sweep: Folder of the sweep, absolute.
+        axes: Keys that are varied.
+        planned: What is varied, joined, -> hash of the run; None where an optimiser plans as it goes.
+        threads: For the numerical libraries; None leaves them alone.
+        parent: Process whose end is to end the worker as well; None where workers live on their own.
+    """
+
+    sweep: Path
+    axes: tuple[str, ...]
+    planned: dict[str, str] | None = None
+    threads: int | None = None
+    parent: int | None = None
+
+    def __call__(self, composed: Any) -> float | None:
+        """Fit; return the run's score, which an optimising sweeper goes by."""
+        from hydra.core.hydra_config import HydraConfig
+
+        from n2n.cli.job import fit_job
+
+        self._settle()
+        config = validate(composed)
+        settings = varied(HydraConfig.get().overrides.task, self.axes)
+        name = run_hash(config)
+        planned = (self.planned or {}).get(" ".join(settings), name)
+        folder = self.sweep / "runs" / planned
+
+        def fit() -> None:
+            if name != planned:
+                raise ConfigError(
+                    "the defaults in conf/ or n2n itself changed while the sweep ran: this would be another run; "
+                    "give the command again"
+                )
+            fit_job(config, folder, self.sweep.name)
+
+        with silenced():
+            state = attempt(folder, settings, lambda: fingerprint(config), fit)
+        return score(folder) if state == "done" else None
+
+    def _settle(self) -> None:
+        """Take the share of the cores; in a process of its own, leave Ctrl-C to the parent and end with it."""
+        if self.threads:
+            import torch
+
+            torch.set_num_threads(self.threads)
+        if self.parent and os.getpid() != self.parent and not any(t.name == _FOLLOWER for t in threading.enumerate()):
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+            threading.Thread(target=_follow, args=(os.getppid(),), name=_FOLLOWER, daemon=True).start()
+
+
+_FOLLOWER = "n2n-follow-parent"
+
+
+def _follow(parent: int) -> None:
+    """End when the parent has ended, however that was: a killed one cannot say so."""
+    while os.getppid() == parent:
+        time.sleep(1)
+    os._exit(1)
