@@ -16,6 +16,7 @@ OPEN_KEYS = (
 
 # Seeds of numpy, torch and Lightning; larger ones are refused by one or the other.
 MAX_SEED = 2**31 - 1
+_MAX_HELD_OUT = 0.5
 # Whole numbers and the lowest value of each; `auto` is kept.
 _WHOLE = {
     "iterations": 1,
@@ -65,11 +66,17 @@ class Config:
         checkpoint_every: Iterations between checkpoints.
         pulls: Times F is applied to denoise a point.
         terms: Further weighted terms of the loss: name -> {weight, arguments}.
+        validation: Share of the points of every observation that is held out of the fit, 0 to 0.5; their mean distance
+            to the fitted surface is the run's score where no truth is known.
+        evaluate: What is measured after the fit, where the data have a truth: `task/protocol`, e.g. denoise/sbp.
+        media: Keep pictures and 3D models in the run folder; null = wherever a logger is in use.
+        recipe: Name of the recipe that was chosen.
     """
 
     seed: int = 0
     device: str = "auto"
     task: str = "reconstruct"
+    recipe: str = ""
     iterations: Any = AUTO
     batch_size: Any = AUTO
     num_observations: int | None = None
@@ -83,6 +90,9 @@ class Config:
     effort: float = 1.0
     checkpoint_every: int = 1000
     pulls: int = 3
+    validation: float = 0.0
+    evaluate: list[str] = field(default_factory=list)
+    media: bool | None = None
     queries: QueriesConfig = field(default_factory=QueriesConfig)
     architecture: dict[str, Any] = field(default_factory=dict)
     distance: dict[str, Any] = field(default_factory=dict)
@@ -116,6 +126,13 @@ class Config:
             raise ConfigError(
                 f"effort={self.effort} (--quality) has no effect on iterations={self.iterations}; leave one of them out"
             )
+        _at_least("validation", self.validation, 0)
+        if self.validation > _MAX_HELD_OUT:
+            raise ConfigError(f"validation={self.validation} is out of range; give a share from 0 to {_MAX_HELD_OUT}")
+        for wanted in self.evaluate:
+            task, slash, protocol = wanted.partition("/")
+            if task not in TASKS or not slash or not protocol:
+                raise ConfigError(f"evaluate={wanted} is not known; give task/protocol, e.g. evaluate=[denoise/sbp]")
         for name, spec in self.terms.items():
             if spec is not None:
                 if not isinstance(spec, dict):

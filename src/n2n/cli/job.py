@@ -2,12 +2,10 @@
 
 import json
 import shutil
-import sys
 import time
 from pathlib import Path
 from typing import Any
 
-from hydra.utils import instantiate
 from omegaconf import OmegaConf
 
 from n2n.cli.console import progress_bar, say
@@ -17,6 +15,8 @@ from n2n.fitting.fit import LAST_CHECKPOINT, fit, pick_device
 from n2n.formats import atomic_path
 from n2n.registry import DATAMODULES
 from n2n.tasks.field import FIELD_FILE, Field
+from n2n.tracking.results import check_evaluations
+from n2n.tracking.tracker import track
 
 RUNS = Path("runs")
 
@@ -33,9 +33,9 @@ def fit_job(config: dict[str, Any], run_dir: Path | None = None, sweep: str | No
         N2NError: The data or the configuration cannot be used, or the folder cannot be written.
     """
     pick_device(config["device"])
+    check_evaluations(config["evaluate"])
     data = _read_data(config)
-    # The content of the files counts, not their names: a scan that was replaced is another run.
-    run_dir = run_dir or RUNS / config_hash({**config, "data": data.fingerprint()})
+    run_dir = run_dir or RUNS / _name(config, data)
     if (run_dir / FIELD_FILE).exists():
         say(f"fit: {run_dir} is finished already; delete it to fit again, or change a setting")
         return run_dir
@@ -45,28 +45,25 @@ def fit_job(config: dict[str, Any], run_dir: Path | None = None, sweep: str | No
         OmegaConf.save(OmegaConf.create(config), run_dir / "config.yaml")
     except OSError as error:
         raise OutputError(f"{run_dir}: cannot be written ({error.strerror}); run n2n in another folder") from error
-    _keep_metrics(run_dir)
-    start = time.perf_counter()
-    failed = True
+    start, tracker = time.perf_counter(), None
     try:
-        logger = instantiate({**config["logger"], "save_dir": str(run_dir)}) if config["logger"] else False
-        with progress_bar("fitting") as report:
-            result = fit(data, config, run_dir, report, logger)
-        failed = False
+        with track(config, run_dir, sweep) as tracker:
+            with progress_bar("fitting") as report:
+                result = fit(data, config, run_dir, report, **tracker.during_fit())
+            field = Field.of(result)
+            seconds = time.perf_counter() - start
+            summary = {**field.report, "seconds": round(seconds, 2), "config": field.config}
+            with atomic_path(run_dir / "summary.json") as temporary:
+                temporary.write_text(json.dumps(summary, indent=1, default=float) + "\n")
+            if remark := tracker.finish(field, data, seconds):
+                say(f"fit: {remark}")
     except Exception:
-        # Nothing there is worth resuming, and nothing else tells a failed run from an unfinished one.
-        if is_new and not (run_dir / LAST_CHECKPOINT).exists():
+        # Nothing there is worth resuming, and nothing else tells a failed run from an unfinished one. What W&B was
+        # told stays: it is to show the failure.
+        shows = tracker is not None and (run_dir / "wandb").exists()
+        if is_new and not shows and not (run_dir / LAST_CHECKPOINT).exists():
             shutil.rmtree(run_dir, ignore_errors=True)
         raise
-    finally:
-        # A run that is not closed shows as still running for ever.
-        if "wandb" in sys.modules and sys.modules["wandb"].run is not None:
-            sys.modules["wandb"].finish(exit_code=int(failed))
-    field = Field.of(result)
-    seconds = time.perf_counter() - start
-    summary = {**field.report, "seconds": round(seconds, 2), "config": field.config}
-    with atomic_path(run_dir / "summary.json") as temporary:
-        temporary.write_text(json.dumps(summary, indent=1, default=float) + "\n")
     # The field comes last: a folder that holds it is finished.
     field.save(run_dir)
     say(f"fit: {field.report['iterations']:,} iterations -> {run_dir}  ({seconds:.0f} s)")
@@ -74,11 +71,13 @@ def fit_job(config: dict[str, Any], run_dir: Path | None = None, sweep: str | No
     return run_dir
 
 
-def _keep_metrics(run_dir: Path) -> None:
-    """Number the log of an interrupted fit: the logger would write over it."""
-    log = run_dir / "metrics.csv"
-    if log.exists():
-        log.rename(run_dir / f"metrics.{len(list(run_dir.glob('metrics.*.csv')))}.csv")
+def _name(config: dict[str, Any], data: Any) -> str:
+    """Return the hash of configuration and data: where it computes and who is told makes no other run.
+
+    The content of the files counts, not their names: a scan that was replaced is another run.
+    """
+    decisive = {key: value for key, value in config.items() if key not in ("logger", "device")}
+    return config_hash({**decisive, "data": data.fingerprint()})
 
 
 def _read_data(config: dict[str, Any]) -> Any:

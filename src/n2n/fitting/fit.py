@@ -3,15 +3,17 @@
 import logging
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import lightning as L
+import numpy as np
 import torch
 from lightning.pytorch.callbacks import ModelCheckpoint
+from numpy.typing import NDArray
 
 from n2n.architectures.base import SDF
 from n2n.compose import config_hash
@@ -29,6 +31,7 @@ from n2n.geometry.frame import Frame
 LAST_CHECKPOINT = "last.ckpt"
 _REDISTANCE_STEPS = 100
 _LOGGED = 1000  # rows of the log, at most twice as many
+_NOT_THE_FIT = ("device", "logger", "evaluate", "media")  # an interrupted fit goes on whatever they say
 
 
 @dataclass
@@ -40,12 +43,14 @@ class FitResult:
         frames: World <-> unit map of each shape.
         config: The configuration with every `auto` filled in.
         report: Measured scales, iterations, seconds, final loss.
+        held_out: Per shape the points that were kept out of the fit, (n, 3) world coordinates.
     """
 
     field: SDF
     frames: list[Frame]
     config: dict[str, Any]
     report: dict[str, Any]
+    held_out: list[NDArray[np.float64]]
 
 
 def fit(
@@ -54,6 +59,8 @@ def fit(
     run_dir: Path | None = None,
     report: Report | None = None,
     logger: Any = False,
+    callbacks: Sequence[L.Callback] = (),
+    watched: Mapping[str, Any] | None = None,
 ) -> FitResult:
     """Fit one field to the observations.
 
@@ -63,6 +70,8 @@ def fit(
         run_dir: Where checkpoints go; an unfinished fit found there is resumed. None keeps nothing.
         report: Told about progress.
         logger: A Lightning logger, or False.
+        callbacks: Further Lightning callbacks.
+        watched: Name -> what is measured of each step's `FieldState` and logged beside the losses.
 
     Raises:
         ConfigError: The configuration cannot be used, or `run_dir` holds another fit.
@@ -73,13 +82,17 @@ def fit(
     seed = config["seed"]
     torch.manual_seed(seed)
     device = pick_device(config["device"])
-    identity = config_hash({**config, "device": None, "data": data.fingerprint()})
+    identity = config_hash({**{k: v for k, v in config.items() if k not in _NOT_THE_FIT}, "data": data.fingerprint()})
+    data, held_out = data.hold_out(config["validation"], seed)
     shapes = prepare(data, config)
     config = fill_config(config, shapes, device)
     field = build_field(config, len(shapes))
     for condition, shape in enumerate(shapes):
         shape.start(field, condition)
     objective = build_objective(config, [shape.guide(device, seed) for shape in shapes])
+    losses = ("loss", "distance", *objective.terms)
+    # A term of weight 0 sees what the others see and leaves the sum as it is, to the last bit.
+    objective.terms = {**{name: (0.0, measure) for name, measure in (watched or {}).items()}, **objective.terms}
     optimizer, scheduler = build_optimizer(config)
     iterations, plan_reuse = config["iterations"], config["plan_reuse"]
     module = FitModule(
@@ -95,7 +108,7 @@ def fit(
         except OSError as error:
             raise OutputError(f"{run_dir}: cannot make this folder ({error.strerror}); choose another one") from error
     data.configure_draws(config["pairs"], config["batch_size"], seed, first, plan_reuse)
-    callbacks: list[L.Callback] = [ProgressReport(report)] if report else []
+    callbacks = [*callbacks, *([ProgressReport(report)] if report else [])]
     if run_dir:
         every = max(1, config["checkpoint_every"] // plan_reuse)
         callbacks.append(
@@ -142,10 +155,12 @@ def fit(
             "outliers": data.outliers,
             "noise": [s.scales.noise * f.scale for s, f in zip(shapes, data.frames, strict=True)],
             "spacing": [s.scales.spacing * f.scale for s, f in zip(shapes, data.frames, strict=True)],
-            "losses": {name: float(value) for name, value in trainer.callback_metrics.items() if name != "step"},
+            "held_out": [len(points) for points in held_out],
+            "losses": {name: float(value) for name, value in trainer.callback_metrics.items() if name in losses},
             "seconds_prepare": round(prepared - start, 2),
             "seconds_fit": round(time.perf_counter() - prepared, 2),
         },
+        held_out=held_out,
     )
 
 

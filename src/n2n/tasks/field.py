@@ -16,6 +16,7 @@ from n2n.fitting.checkpoint import read_state, unreadable, write_state
 from n2n.fitting.fit import FitResult, pick_device
 from n2n.geometry.frame import Frame
 from n2n.geometry.sparse_grid import triple
+from n2n.metrics.point_mesh import distances_to_mesh
 from n2n.tasks.points import denoise_points, upsample_points
 from n2n.tasks.surface import field_box, reconstruct_surface
 
@@ -43,8 +44,15 @@ class Field:
 
     @classmethod
     def of(cls, result: FitResult) -> "Field":
-        """Wrap the result of a fit."""
-        return cls(result.field, result.frames, result.config, result.report)
+        """Wrap the result of a fit; the points it held out, if any, score it (`validation` in the report).
+
+        Raises:
+            SurfaceError: There is no surface that points could be held against.
+        """
+        field = cls(result.field, result.frames, result.config, result.report)
+        if any(map(len, result.held_out)):
+            field.report["validation"], field.report["validation_relative"] = _score(field, result.held_out)
+        return field
 
     def reconstruct(
         self, resolution: int = 256, edge: float | None = None, shape: int = 0, keep_all: bool = False
@@ -145,6 +153,19 @@ class Field:
         except (RuntimeError, KeyError, ValueError, TypeError) as error:
             raise unreadable(path, error) from error
         return cls(sdf.eval().to(pick_device(device)), frames, state["config"], state["report"])
+
+
+def _score(field: Field, held_out: list[NDArray[np.float64]]) -> tuple[float, float]:
+    """Return the mean distance of held-out points to the surface, in world units and in units of the noise.
+
+    The surface itself is what they are held against: a field whose values shrink would look ever closer.
+    """
+    distances, relative = [], []
+    for shape, (points, noise) in enumerate(zip(held_out, field.report["noise"], strict=True)):
+        mesh = field.reconstruct(shape=shape)
+        distances.append(distances_to_mesh(points, np.asarray(mesh.vertices), np.asarray(mesh.faces)))
+        relative.append(distances[-1] / noise)
+    return float(np.concatenate(distances).mean()), float(np.concatenate(relative).mean())
 
 
 def _points(points: NDArray[np.float64]) -> NDArray[np.float64]:

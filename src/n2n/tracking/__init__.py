@@ -1,1 +1,1 @@
-"""What a fit tells about itself: metrics, pictures, clouds."""
+"""What a run tells while it goes on and leaves behind for others to look at: metrics, evaluations, pictures, 3D."""
