@@ -9,7 +9,7 @@ from typing import Any
 
 from benchmarks import machine
 
-NAMES = ("matching", "step", "extraction", "metrics", "overhead", "job", "scaling", "gpu")
+NAMES = ("matching", "step", "extraction", "metrics", "overhead", "job", "scaling", "sweep", "dashboard", "gpu")
 
 
 def module(name: str) -> Any:

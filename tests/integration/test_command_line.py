@@ -627,13 +627,14 @@ def test_las_says_what_it_cannot_store(run_folder, n2n):
 
 def test_a_sweep_goes_on_after_a_failure_and_lists_it(n2n, tmp_path):
     paths = "datamodule.paths=[scan.xyz],[none.xyz],[scan.xyz,scan.xyz]"
-    code, _, error = n2n("fit", "-m", "datamodule=files", paths, QUICK)
+    code, _, error = n2n("fit", "-m", "sweep=x", "datamodule=files", paths, QUICK, "hydra/launcher=basic")
     assert code == 2
     lines = error.splitlines()
-    assert "n2n: error: none.xyz: no such file" in lines
-    assert "fit: 2 of 3 jobs finished" in lines
-    assert lines[-1].startswith("  failed: ") and "[none.xyz]" in lines[-1] and "no such file" in lines[-1]
-    assert len(list(tmp_path.glob("runs/*/field.ckpt"))) == len(list(tmp_path.glob("runs/*/"))) == 2
+    assert "2/3 failed: datamodule.paths=[none.xyz]: none.xyz: no such file" in lines[2]
+    assert "sweep x: 2 of 3 done, 1 failed" in lines
+    assert lines[-2].startswith("  failed: ") and "[none.xyz]" in lines[-2] and "no such file" in lines[-2]
+    assert lines[-1] == "next: n2n sweep retry x"
+    assert len(list(tmp_path.glob("sweeps/x/runs/*/field.ckpt"))) == 2
 
 
 def test_fit_prints_the_configuration_and_does_nothing(n2n, tmp_path):

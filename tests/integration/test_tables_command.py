@@ -109,16 +109,27 @@ def test_render_makes_the_same_tables_anywhere(tables, folder):
         assert (folder / "again" / path.name).read_text() == path.read_text()
 
 
-def test_a_damaged_result_is_named(tables, folder):
-    path = next((folder / "kept").rglob("*.json"))
+def test_a_damaged_result_is_named_and_the_rest_is_shown_and_run_measures_it_again(tables, folder):
+    path = next(p for p in (folder / "kept").rglob("*.json") if '"done"' in p.read_text())
     text = path.read_text()
     path.write_text(text[:100])
-    try:
-        code, out, error = tables("status", *TABLES)
-        assert (code, out) == (2, "") and error.count("\n") == 1
-        assert error.startswith(f"n2n: error: {path.relative_to(folder)}: cannot be read")
-    finally:
-        path.write_text(text)
+    code, out, error = tables("status", *TABLES)
+    assert (code, error) == (2, "") and out.count(str(path.relative_to(folder))) == 1
+    assert f"damaged: {path.relative_to(folder)}: cannot be read" in out
+    assert "damaged: 1; `n2n tables run` measures them again" in out and "failed: generated" in out
+    code, out, error = tables("render", *TABLES, "--out", "holed")
+    assert (code, out) == (2, "") and "2 rendered" in error and f"damaged: {path.relative_to(folder)}" in error
+    holed = [
+        row for name in ("mine", "T10_observations") for row in csv.DictReader((folder / f"holed/{name}.csv").open())
+    ]
+    assert any("its result file is damaged" in row["remark"] and row["value"] == "" for row in holed)
+    assert any(row["value"] and row["origin"] == "n2n" for row in holed)
+    code, out, error = tables("run", *TABLES)
+    assert code == 2 and f"damaged: {path.relative_to(folder)}" in error and "1 of 2 fits measured" in error
+    before, after = json.loads(text), json.loads(path.read_text())
+    assert after["results"].keys() == before["results"].keys()
+    assert all(after["results"][e]["values"] == result["values"] for e, result in before["results"].items())
+    assert "damaged" not in tables("status", *TABLES)[1]
 
 
 @pytest.mark.parametrize(

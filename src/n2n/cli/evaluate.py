@@ -54,8 +54,9 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; return the exit code."""
     import json
 
+    from n2n.datamodules.shape_files import read_reference, read_shape
     from n2n.errors import ConfigError
-    from n2n.evaluation.files import fingerprint, read_prediction, read_reference, read_shape
+    from n2n.evaluation.files import fingerprint, read_prediction
     from n2n.evaluation.protocol import load_protocol
     from n2n.evaluation.provenance import provenance
     from n2n.formats import atomic_path, check_writable

@@ -5,8 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from n2n.cli.console import progress_bar, say
+from n2n.tables.launch import launch
+from n2n.tables.methods import not_installed
 from n2n.tables.plan import Job, Plan, estimate
 from n2n.tables.run import run as run_plan
+from n2n.tables.shared import measured_now, open_jobs
 from n2n.tables.store import Store
 from n2n.tables.write import write_tables
 
@@ -21,6 +24,8 @@ class Request:
         out: Where tables are written.
         workers: Fits at a time.
         again: Also what other sources have measured.
+        launcher: Starts the workers; None: processes of this one.
+        settings: Of the launcher.
     """
 
     plan: Plan
@@ -28,6 +33,8 @@ class Request:
     out: Path
     workers: int = 1
     again: bool = False
+    launcher: str | None = None
+    settings: tuple[str, ...] = ()
 
 
 def plan(request: Request) -> int:
@@ -40,7 +47,8 @@ def plan(request: Request) -> int:
         blanks = sum(bool(cell.reason) for cell in plan.wanted[table.name])
         _print_row(table.name, jobs, store, plan, f"{blanks} of {len(plan.wanted[table.name])}" if blanks else "")
     _print_row("all, shared fits once", list(plan.jobs.values()), store, plan)
-    for reason in sorted({cell.reason for cells in plan.wanted.values() for cell in cells if cell.reason}):
+    reasons = {cell.reason for cells in plan.wanted.values() for cell in cells if cell.reason}
+    for reason in sorted(reasons | _not_installed(plan, store)):
         print(f"blank: {reason}")
     if plan.profile.datamodule is None:
         partial = [cell for cells in plan.wanted.values() for cell in cells if cell.fits and not cell.whole]
@@ -53,11 +61,32 @@ def plan(request: Request) -> int:
 def run(request: Request) -> int:
     """Measure what is not done, write the tables; return 2 where a fit failed."""
     plan, store = request.plan, request.store
+    for line in _damaged(plan, store):
+        say(f"{line}; measured again")
     todo, stale = plan.open(store), plan.stale(store)
     if stale and not request.again:
         say(f"tables: {len(stale)} results were made by other sources of n2n and are kept; --again measures them anew")
-    total, done = len(todo) + (len(stale) if request.again else 0), 0
-    with progress_bar(f"{total} fits, {len(plan.jobs) - len(todo)} done before") as report:
+    total = len(open_jobs(plan, store, request.again))
+    measure = _measure_here if request.launcher is None else _measure_launched
+    try:
+        failures = measure(request, total, len(plan.jobs) - len(todo))
+    except KeyboardInterrupt as stop:
+        raise KeyboardInterrupt(str(stop) or "what was measured is kept; the same command goes on") from stop
+    rest = len(open_jobs(plan, store, request.again))
+    say(f"tables: {total - rest} of {total} fits measured -> {store.folder}")
+    busy = len(measured_now(plan, store))
+    if busy:
+        say(f"tables: {busy} more are being measured by other processes; `n2n tables status` looks in")
+    if lost := max(0, rest - busy - len(failures)):
+        say(f"tables: {lost} are left, their processes were lost; the same command goes on")
+    render(request)
+    return 2 if failures or lost else 0
+
+
+def _measure_here(request: Request, total: int, before: int) -> list[tuple[Job, str]]:
+    """Measure in processes of this one; return the failures."""
+    done = 0
+    with progress_bar(f"{total} fits, {before} done before") as report:
 
         def told(job: Job, error: str) -> None:
             nonlocal done
@@ -67,17 +96,28 @@ def run(request: Request) -> int:
             if error:
                 say(f"failed: {_described(job)}: {error}")
 
-        try:
-            failures = run_plan(plan, store, request.workers, request.again, told)
-        except KeyboardInterrupt as stop:
-            raise KeyboardInterrupt("what was measured is kept; the same command goes on") from stop
-    say(f"tables: {total - len(failures)} of {total} fits measured -> {store.folder}")
-    render(request)
-    return 2 if failures else 0
+        return run_plan(request.plan, request.store, request.workers, request.again, told)
+
+
+def _measure_launched(request: Request, total: int, before: int) -> list[tuple[Job, str]]:
+    """Measure in workers that a launcher starts; return the failures."""
+    workers = min(request.workers, total)
+    say(f"tables: {total} fits, {before} done before, {workers} workers; `n2n tables status` looks in")
+    try:
+        failures = launch(
+            request.plan, request.store, request.workers, request.launcher or "", request.settings, request.again
+        )
+    except KeyboardInterrupt as stop:
+        raise KeyboardInterrupt(
+            "what was measured is kept; workers of a cluster go on (`n2n tables status` tells; scancel ends them)"
+        ) from stop
+    for job, error in failures:
+        say(f"failed: {_described(job)}: {error}")
+    return failures
 
 
 def status(request: Request) -> int:
-    """Print how far it is, and what failed; return 2 where something did."""
+    """Print how far it is, what is being measured, what failed, what is damaged; return 2 for the last two."""
     plan, store = request.plan, request.store
     for table in plan.tables:
         jobs = _jobs(plan, table.name)
@@ -88,19 +128,26 @@ def status(request: Request) -> int:
         record = store.read(job.fit)
         if record is not None and record["status"] == "failed":
             failed.append(f"failed: {_described(job)}: {record['error']}")
-    print("\n".join([*failed, f"made by other sources: {len(plan.stale(store))}"]))
-    return 2 if failed else 0
+    busy = [f"being measured: {_described(job)}" for job in measured_now(plan, store)]
+    damaged = _damaged(plan, store)
+    counts = [f"damaged: {len(damaged)}; `n2n tables run` measures them again"] if damaged else []
+    blank = [f"blank: {reason}" for reason in sorted(_not_installed(plan, store))]
+    print("\n".join([*busy, *failed, *damaged, *counts, *blank, f"made by other sources: {len(plan.stale(store))}"]))
+    return 2 if failed or damaged else 0
 
 
 def render(request: Request) -> int:
-    """Write the tables of what is there."""
+    """Write the tables of what is there; return 2 where a result is damaged."""
     made = write_tables(request.plan, request.store, request.out)
     ours, blank = (sum(getattr(table, name) for table in made.values()) for name in ("ours", "blank"))
     say(
         f"tables: {len(made)} rendered, {ours} cells of ours, {blank} blank, each with its reason "
         f"-> {request.out / 'index.md'}"
     )
-    return 0
+    damaged = _damaged(request.plan, request.store)
+    for line in damaged:
+        say(f"{line}; left out, `n2n tables run` measures it again")
+    return 2 if damaged else 0
 
 
 def _jobs(plan: Plan, table: str) -> list[Job]:
@@ -108,8 +155,19 @@ def _jobs(plan: Plan, table: str) -> list[Job]:
     return [plan.jobs[fit] for fit in dict.fromkeys(fit for cell in plan.wanted[table] for fit in cell.fits)]
 
 
+def _not_installed(plan: Plan, store: Store) -> set[str]:
+    """Return which packages the fits lack that are neither done nor to be done here."""
+    return {not_installed(job.fit.method) for job in plan.jobs.values() if not plan.is_done(job, store)} - {""}
+
+
+def _damaged(plan: Plan, store: Store) -> list[str]:
+    """Return a line for each result file that cannot be read."""
+    records = (store.read(fit) for fit in plan.jobs)
+    return [f"damaged: {r['error']}" for r in records if r is not None and r["status"] == "damaged"]
+
+
 def _print_row(name: str, jobs: list[Job], store: Store, plan: Plan, blanks: str = "") -> None:
-    todo = [job for job in jobs if not plan.is_done(job, store)]
+    todo = [job for job in jobs if plan.is_open(job, store)]
     here, gpu = (sum(estimate(job, on_gpu) for job in todo) / 3600 for on_gpu in (False, True))
     print(f"{name:<34} {len(jobs):>6} {len(todo):>6} {here:>11.2f} {gpu:>9.2f}  {blanks}".rstrip())
 

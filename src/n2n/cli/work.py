@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from n2n.tasks.field import Field
 
 _RESOLUTIONS = (8, 2048)
-_ONLY_FIT = ("datamodule", "logger", "checkpoint_every", "task", "hydra")
+_ONLY_FIT = ("datamodule", "logger", "checkpoint_every", "task", "validation", "evaluate", "media", "hydra")
 
 
 def run_work(options: argparse.Namespace) -> int:

@@ -1,5 +1,6 @@
 """The data of a fit: noisy observations of one or several shapes, in unit coordinates, drawn in pairs."""
 
+import copy
 import hashlib
 from dataclasses import dataclass
 from typing import Any
@@ -13,6 +14,9 @@ from torch.utils.data import DataLoader, IterableDataset
 from n2n.errors import InputError
 from n2n.geometry.frame import Frame
 from n2n.geometry.outliers import first_of_equal, outliers
+
+# Follows the seed, so that no other draw of the fit repeats this one.
+_HELD_OUT = (0, 2)
 
 
 @dataclass
@@ -68,6 +72,32 @@ class ObservationsDataModule(L.LightningDataModule):
             self.frames.append(frame)
             self.shapes.append([torch.as_tensor(frame.to_unit(c), dtype=torch.float32) for c in used])
         self._blocks: dict[str, Any] = {"pairs": "random", "points": 1, "seed": 0}
+
+    def hold_out(self, share: float, seed: int) -> tuple["ObservationsDataModule", list[NDArray[np.float64]]]:
+        """Split points off every observation; which ones depends on the seed alone.
+
+        Args:
+            share: Of each observation's points, 0 to 1; at least one point of each if above 0.
+            seed: Of the choice.
+
+        Returns:
+            The data without these points, in the same frames, and per shape these points (n, 3), world coordinates.
+        """
+        if not share:
+            return self, [np.empty((0, 3)) for _ in self.shapes]
+        rest, held_out = copy.copy(self), []
+        rest.shapes = []
+        for condition, (frame, clouds) in enumerate(zip(self.frames, self.shapes, strict=True)):
+            kept, taken = [], []
+            for index, cloud in enumerate(clouds):
+                random = np.random.default_rng([seed, condition, index, *_HELD_OUT])
+                chosen = np.zeros(len(cloud), bool)
+                chosen[random.choice(len(cloud), max(1, round(share * len(cloud))), replace=False)] = True
+                kept.append(cloud[torch.as_tensor(~chosen)])
+                taken.append(cloud[torch.as_tensor(chosen)].double().numpy())
+            rest.shapes.append(kept)
+            held_out.append(frame.to_world(np.concatenate(taken)))
+        return rest, held_out
 
     def configure_draws(self, pairs: str, points: int, seed: int, first: int = 0, step: int = 1) -> None:
         """Say how pairs are drawn.

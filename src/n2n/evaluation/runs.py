@@ -45,16 +45,21 @@ def read_run(folder: str | Path, device: str = "auto") -> Run:
     # Two frames that agree in every digit belong to the same first cloud, or to none that was changed by chance.
     if data.frames[0] != field.frames[0]:
         raise InputError(f"{folder}: its data have changed since the fit; fit anew, or evaluate its result as a file")
-    noisy = getattr(data, "noisy", None)
-    noisy = data.frames[0].to_world(data.shapes[0][0].numpy()) if noisy is None else noisy
+    noisy = noisy_points(data)
     task, name = field.config["task"], getattr(data, "name", field.config["datamodule"]["name"])
     description = f"{task} of {name}: {getattr(data, 'source', 'the first observation')}"
     return Run(predict(field, noisy), getattr(data, "reference", None), noisy, description, field.config)
 
 
-def predict(field: Field, noisy: NDArray[np.float64]) -> NDArray[np.float64] | trimesh.Trimesh:
-    """Do the task a field was fitted for, with its defaults."""
-    task = field.config["task"]
+def noisy_points(data: Any) -> NDArray[np.float64]:
+    """Return the first observation of the first shape, (n, 3) world coordinates: what is to be denoised."""
+    noisy = getattr(data, "noisy", None)
+    return data.frames[0].to_world(data.shapes[0][0].double().numpy()) if noisy is None else noisy
+
+
+def predict(field: Field, noisy: NDArray[np.float64], task: str | None = None) -> NDArray[np.float64] | trimesh.Trimesh:
+    """Do a task with its defaults; None for the one a field was fitted for."""
+    task = task or field.config["task"]
     if task == "reconstruct":
         return field.reconstruct()
     return field.denoise(noisy) if task == "denoise" else field.upsample(noisy)

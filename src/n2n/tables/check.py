@@ -10,8 +10,8 @@ _TABLE = {
     "footnotes": list, "derived": list, "profiles": dict,
 }  # fmt: skip
 _EXPERIMENT = {
-    "datamodule": str, "method": str, "shapes": str, "axes": dict, "settings": list, "evaluate": str, "cells": list,
-    "only": list, "note": str,
+    "datamodule": str, "method": str, "shapes": (str, list), "axes": dict, "settings": list, "evaluate": str,
+    "cells": list, "only": list, "note": str,
 }  # fmt: skip
 _CELL = {
     "row": str, "column": str, "value": str, "scale": (int, float), "evaluate": str, "mean": str,
@@ -39,6 +39,11 @@ def check_table(where: str, spec: dict[str, Any]) -> None:
         _check(here, experiment, _EXPERIMENT, needed=("datamodule", "cells"))
         axes |= set(experiment.get("axes", {}))
         _check_axes(here, experiment.get("axes", {}))
+        if experiment["datamodule"] == "files" and not isinstance(experiment.get("shapes"), list):
+            raise ConfigError(
+                f"{here}: files do not say which shapes they are; name them, shapes: [cup, vase], and their files by "
+                "the settings, datamodule.paths=[scans/{shape}.ply] datamodule.reference=[true/{shape}.off]"
+            )
         for cell in experiment["cells"]:
             _check(f"{here}: a cell", cell, _CELL, needed=("row", "column", "value"))
     for name, own in spec.get("profiles", {}).items():
@@ -82,4 +87,9 @@ def _check(where: str, spec: Any, known: dict[str, Any], needed: tuple[str, ...]
             raise ConfigError(f"{where}: {key} is missing")
 
 
-_NEEDED = {str: "it needs text; put it in quotes", list: "it needs a list, [a, b]", dict: "it needs key: value"}
+_NEEDED = {
+    str: "it needs text; put it in quotes",
+    list: "it needs a list, [a, b]",
+    dict: "it needs key: value",
+    (str, list): "it needs a pattern of names, or a list of names",
+}

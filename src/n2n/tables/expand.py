@@ -7,12 +7,14 @@ from fnmatch import fnmatch
 from typing import Any, NamedTuple
 
 from n2n.errors import ConfigError
-from n2n.registry import BASELINES, suggest
+from n2n.registry import suggest
+from n2n.tables.methods import check_method
 from n2n.tables.spec import Fit, Profile, Table, Wanted
 
 TASKS = ("denoise", "reconstruct", "upsample")
 COSTS = ("minutes", "memory", "seconds")
 _AXIS = re.compile(r"\{(\w+)\}")
+_BETWEEN = re.compile(r"\s+(?=[\w.]+=)")  # two settings of one text; names of files may hold blanks
 
 # Of a datamodule: names of the shapes present, and what is missing and where to get it.
 Present = Callable[[str, str | None], tuple[list[str], str | None]]
@@ -45,7 +47,6 @@ def expand(table: Table, profile: Profile, present: Present) -> list[Wanted]:
     for experiment in table.spec["experiments"]:
         if profile.name in experiment.get("only", [profile.name]):
             try:
-                _check_method(experiment.get("method", "n2n"))
                 cells += _experiment(experiment, own, profile, present)
             except ConfigError as error:
                 raise ConfigError(f"table {table.name}: {error}") from error
@@ -59,6 +60,8 @@ def _experiment(spec: dict[str, Any], own: dict[str, Any], profile: Profile, pre
     wanted = []
     for labels in itertools.product(*axes.values()):
         point: Point = {name: (label, axes[name][label]) for name, label in zip(axes, labels, strict=True)}
+        method = _fill(spec.get("method", "n2n"), point, 1)
+        check_method(method)
         for cell in spec["cells"]:
             evaluation = _fill(cell.get("evaluate", spec.get("evaluate", "")), point, 1)
             value = _fill(cell["value"], point, 1)
@@ -68,7 +71,7 @@ def _experiment(spec: dict[str, Any], own: dict[str, Any], profile: Profile, pre
             # Settings may depend on what the field is for: `task={task}`.
             task = evaluation.split("/")[0] or "denoise"
             settled = {**point, "task": (task, task)}
-            found = _Fits([], skip) if skip else _fits(spec, own, profile, present, settled)
+            found = _Fits([], skip) if skip else _fits(spec, own, profile, present, method, settled)
             wanted.append(
                 Wanted(
                     row=_fill(cell["row"], point, 0),
@@ -76,6 +79,7 @@ def _experiment(spec: dict[str, Any], own: dict[str, Any], profile: Profile, pre
                     evaluation=evaluation,
                     value=value,
                     scale=float(cell.get("scale", 1)),
+                    method=method,
                     by_class=cell.get("mean") == "class",
                     whole=found.whole,
                     fits=found.fits,
@@ -84,11 +88,6 @@ def _experiment(spec: dict[str, Any], own: dict[str, Any], profile: Profile, pre
                 )
             )
     return wanted
-
-
-def _check_method(method: str) -> None:
-    if method != "n2n" and method not in BASELINES.names():
-        raise ConfigError(f"Unknown method {method!r}.{suggest(method, ['n2n', *BASELINES.names()])}")
 
 
 def _check(evaluation: str, value: str) -> None:
@@ -104,19 +103,27 @@ def _check(evaluation: str, value: str) -> None:
         raise ConfigError(f"Unknown task {task!r}.{suggest(task, list(TASKS))}")
 
 
-def _fits(spec: dict[str, Any], own: dict[str, Any], profile: Profile, present: Present, point: Point) -> _Fits:
+def _fits(
+    spec: dict[str, Any], own: dict[str, Any], profile: Profile, present: Present, method: str, point: Point
+) -> _Fits:
     """Return the fits at one point of the axes, or why there are none, and what a reader must know about them."""
-    method = spec.get("method", "n2n")
     stand_in = profile.datamodule
     datamodule = stand_in or spec["datamodule"]
     texts = [*profile.settings, *own.get("settings", []), *spec.get("settings", [])]
-    settings = _settings([_fill(text, point, 1) for text in texts], profile)
-    variant = next((text.partition("=")[2] for text in settings if text.startswith("datamodule.variant=")), None)
-    names, missing = present(datamodule, variant)
-    pattern = "*" if stand_in else _fill(spec.get("shapes", "*"), point, 1)
-    names = [name for name in names if fnmatch(name, pattern)]
-    if not names:
-        return _Fits([], missing or f"{datamodule}: no shape {pattern} is here")
+
+    def settings(shape: str) -> tuple[str, ...]:
+        return _settings([_fill(text, {**point, "shape": (shape, shape)}, 1) for text in texts], profile)
+
+    shapes, missing = spec.get("shapes", "*"), None
+    if isinstance(shapes, list) and not stand_in:
+        names = [_fill(name, point, 1) for name in shapes]
+    else:
+        variant = next((t.partition("=")[2] for t in settings("*") if t.startswith("datamodule.variant=")), None)
+        names, missing = present(datamodule, variant)
+        pattern = "*" if stand_in else _fill(shapes, point, 1)
+        names = [name for name in names if fnmatch(name, pattern)]
+        if not names:
+            return _Fits([], missing or f"{datamodule}: no shape {pattern} is here")
     chosen = None if stand_in else own.get("shapes")
     if chosen:
         names = [name for name in names if name in chosen]
@@ -126,12 +133,12 @@ def _fits(spec: dict[str, Any], own: dict[str, Any], profile: Profile, present: 
     names = names[: profile.shapes]
     notes = (missing,) if missing and not stand_in else ()
     whole = not (stand_in or missing or chosen or profile.shapes)
-    return _Fits([Fit(method, datamodule, name, settings) for name in names], "", notes, whole)
+    return _Fits([Fit(method, datamodule, name, settings(name)) for name in names], "", notes, whole)
 
 
 def _settings(settings: list[str], profile: Profile) -> tuple[str, ...]:
     """Return each key once, the last word counting, within the profile's limits."""
-    texts = [text for group in settings for text in group.split()]
+    texts = [text for group in settings for text in _BETWEEN.split(group.strip())]
     for text in texts:
         if "=" not in text:
             raise ConfigError(f"cannot read the setting {text!r}; write key=value")

@@ -1,13 +1,15 @@
 """From stored results to a table: ours beside the published numbers."""
 
 import statistics
+from collections import Counter
 from typing import Any
 
 from n2n.evaluation.measures import MEASURES
 from n2n.evaluation.protocol import CROPPED
-from n2n.tables.grid import FLOOR, OURS, PAPER, Cell, Grid, Published, published
+from n2n.tables.grid import FLOOR, OTHER, OURS, PAPER, Cell, Grid, Published, published
+from n2n.tables.methods import not_installed
 from n2n.tables.plan import Plan
-from n2n.tables.spec import Fit, Table, Wanted
+from n2n.tables.spec import Table, Wanted
 from n2n.tables.store import Store, lacking
 
 
@@ -21,20 +23,24 @@ def fill(table: Table, plan: Plan, store: Store) -> tuple[Grid, Published]:
     _footnotes(grid, table.spec.get("footnotes", []))
     _mark_best(grid, table.spec)
     _order(grid)
+    _tell_sources(grid)
     return grid, paper
 
 
 def _cell(wanted: Wanted, store: Store, protocols: dict[str, str]) -> Cell:
-    origin = FLOOR if wanted.floor else OURS
+    origin = FLOOR if wanted.floor else OURS if wanted.method == "n2n" else OTHER
     if wanted.reason:
         return Cell(None, origin, wanted.reason)
     groups: dict[str, list[float]] = {}
     lost: dict[str, str] = {}
+    sources: Counter[str] = Counter()
     for fit in wanted.fits:
-        value, why = _value(wanted, fit, store, protocols)
-        if value is None:
+        record = store.read(fit)
+        value, why = _value(wanted, record, protocols)
+        if record is None or value is None:
             lost[fit.shape] = why
         else:
+            sources[record["made"]["sources"]] += 1
             groups.setdefault(fit.shape.split("/")[0] if wanted.by_class else "", []).append(value)
     reasons = [f"{shape}: {why}" for shape, why in lost.items()]
     if not groups:
@@ -45,6 +51,9 @@ def _cell(wanted: Wanted, store: Store, protocols: dict[str, str]) -> Cell:
         notes.append(f"mean of {count} of {len(wanted.fits)} shapes; {'; '.join(reasons)}")
     if wanted.by_class:
         notes.append(f"mean over {len(groups)} classes: {', '.join(groups)}")
+    if len(sources) > 1:
+        parts = ", ".join(f"{number} by {name}" for name, number in sorted(sources.items()))
+        notes.append(f"mean over results of different sources of n2n: {parts}")
     mean = statistics.fmean(statistics.fmean(group) for group in groups.values())
     return Cell(
         value=wanted.scale * mean,
@@ -53,6 +62,7 @@ def _cell(wanted: Wanted, store: Store, protocols: dict[str, str]) -> Cell:
         whole=wanted.whole and not lost,
         higher=_is_higher_better(wanted.value.rpartition(".")[2]),
         notes=notes,
+        sources=sorted(sources),
     )
 
 
@@ -61,11 +71,12 @@ def _is_higher_better(metric: str) -> bool:
     return measure is not None and measure.better == "high"
 
 
-def _value(wanted: Wanted, fit: Fit, store: Store, protocols: dict[str, str]) -> tuple[float | None, str]:
-    """Return a number, or why there is none."""
-    record = store.read(fit)
+def _value(wanted: Wanted, record: dict[str, Any] | None, protocols: dict[str, str]) -> tuple[float | None, str]:
+    """Return a number of a record, or why there is none."""
     if record is None:
-        return None, "not measured yet"
+        return None, not_installed(wanted.method) or "not measured yet"
+    if record["status"] == "damaged":
+        return None, "not measured: its result file is damaged"
     if record["status"] != "done":
         return None, f"failed: {record['error']}"
     if blank := record["results"].get(wanted.evaluation, {}).get("blank"):
@@ -137,3 +148,13 @@ def _order(grid: Grid) -> None:
     for row in grid.rows:
         groups.setdefault(row.split("/")[0] if "/" in row else "", []).append(row)
     grid.rows = [row for rows in groups.values() for row in rows]
+
+
+def _tell_sources(grid: Grid) -> None:
+    """Remark that numbers which stand side by side were measured by different sources."""
+    sources = sorted({name for cell in grid.cells.values() for name in cell.sources})
+    if len(sources) > 1:
+        grid.remarks.append(
+            f"our numbers in this table were measured by different sources of n2n ({', '.join(sources)}), so they may "
+            "differ by more than what stands at their rows and columns; `n2n tables run --again` measures them anew"
+        )

@@ -10,7 +10,7 @@ import yaml
 from n2n.errors import ConfigError
 from n2n.registry import suggest
 
-PAPER, OURS, FLOOR = "paper", "n2n", "reference value"
+PAPER, OURS, OTHER, FLOOR = "paper", "n2n", "measured here", "reference value"
 
 
 @dataclass
@@ -19,13 +19,14 @@ class Cell:
 
     Attributes:
         value: In the table's unit; None is a blank.
-        origin: Who says so: paper | n2n | reference value (a floor, or doing nothing).
+        origin: Who says so: paper | n2n | measured here (another method) | reference value (a floor, or doing nothing).
         reason: Why it is blank.
         shapes: Over how many shapes a number of ours is the mean.
         whole: These are all shapes of the dataset.
         higher: Of two such numbers the higher one is better.
         bold: Marked as best, by the paper or by us.
         notes: Footnotes.
+        sources: Which sources of n2n measured it; several where results of different ones are averaged.
     """
 
     value: int | float | None
@@ -36,15 +37,17 @@ class Cell:
     higher: bool = False
     bold: bool = False
     notes: list[str] = field(default_factory=list)
+    sources: list[str] = field(default_factory=list)
 
 
 @dataclass
 class Grid:
-    """Rows and columns in order, cells by (row, column); nested labels are joined by `/`."""
+    """Rows and columns in order, cells by (row, column); nested labels are joined by `/`. Remarks are of them all."""
 
     rows: list[str] = field(default_factory=list)
     columns: list[str] = field(default_factory=list)
     cells: dict[tuple[str, str], Cell] = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)
 
     def put(self, row: str, column: str, cell: Cell) -> None:
         """Add a cell, and its row and column where they are new."""

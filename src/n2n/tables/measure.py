@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from n2n.compose import compose, config_hash
-from n2n.datamodules.benchmark import BenchmarkDataModule
 from n2n.errors import ConfigError, N2NError
 from n2n.evaluation.protocol import Protocol, load_protocol
 from n2n.evaluation.provenance import provenance
 from n2n.fitting.fit import fit as fit_data
+from n2n.geometry.reference import Reference
 from n2n.registry import BASELINES, DATAMODULES
 from n2n.tables.memory import peak, reset_peak
 from n2n.tables.spec import Fit
@@ -51,13 +51,14 @@ def _run(fit: Fit, evaluations: Mapping[str, Set[str]], samples: int | None) -> 
     shape = fit.shape.replace("'", r"\'")
     config = compose([f"datamodule={fit.datamodule}", f"datamodule.shape='{shape}'", *fit.settings])
     data = DATAMODULES.build(config["datamodule"], num_observations=config["num_observations"])
-    if not isinstance(data, BenchmarkDataModule):
+    if not hasattr(data, "reference"):
         raise ConfigError(f"datamodule {fit.datamodule!r} knows no true surface; tables need a benchmark datamodule")
+    truth: Reference = data.reference or Reference()
     made = {"source": data.source}
     made["config"] = config_hash({**config, "device": None, "data": data.fingerprint()})
     wanted = {evaluation: floors for evaluation, floors in sorted(evaluations.items()) if evaluation}
     results = {}
-    if data.reference.points is None and data.reference.vertices is None:
+    if truth.points is None and truth.vertices is None:
         blank = {"values": {}, "floors": {}, "blanks": {}, "blank": f"no ground truth of {fit.shape} is present"}
         results = {evaluation: {**_asked(evaluation, floors), **blank} for evaluation, floors in wanted.items()}
         if "" not in evaluations:
@@ -72,7 +73,7 @@ def _run(fit: Fit, evaluations: Mapping[str, Set[str]], samples: int | None) -> 
         method, about = BASELINES.build(fit.method), {}
     seconds = time.perf_counter() - start
     for evaluation in [name for name in wanted if name not in results]:
-        results[evaluation] = _evaluate(method, data, evaluation, wanted[evaluation], samples)
+        results[evaluation] = _evaluate(method, data.noisy, truth, evaluation, wanted[evaluation], samples)
     return {
         **made,
         "fit": about,
@@ -82,11 +83,11 @@ def _run(fit: Fit, evaluations: Mapping[str, Set[str]], samples: int | None) -> 
 
 
 def _evaluate(
-    method: Any, data: BenchmarkDataModule, evaluation: str, floors: Set[str], samples: int | None
+    method: Any, noisy: np.ndarray, truth: Reference, evaluation: str, floors: Set[str], samples: int | None
 ) -> dict[str, Any]:
     task, protocol = evaluation.split("/")
-    prediction, seconds = _predict(method, task, data.noisy)
-    scored = _protocol(protocol, floors, samples).evaluate(prediction, data.reference, data.noisy)
+    prediction, seconds = _predict(method, task, noisy)
+    scored = _protocol(protocol, floors, samples).evaluate(prediction, truth, noisy)
     return {
         **_asked(evaluation, floors),
         "values": _short(scored.values),

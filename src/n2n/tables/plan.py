@@ -10,6 +10,7 @@ from typing import Any
 from n2n.errors import ConfigError, N2NError
 from n2n.registry import DATAMODULES
 from n2n.tables.expand import as_number, expand
+from n2n.tables.methods import not_installed
 from n2n.tables.spec import Fit, Profile, Table, Wanted, choose, load_tables, own_tables
 from n2n.tables.store import Store, lacking, protocol_hash, sources
 
@@ -47,7 +48,11 @@ class Plan:
 
     def open(self, store: Store) -> list[Job]:
         """Return the jobs that are not done: a fit is not kept, so what lacks one evaluation is measured whole."""
-        return [job for job in self.jobs.values() if not self.is_done(job, store)]
+        return [job for job in self.jobs.values() if self.is_open(job, store)]
+
+    def is_open(self, job: Job, store: Store) -> bool:
+        """Tell whether a job is to be done; what needs a package that is not installed is not."""
+        return not self.is_done(job, store) and not not_installed(job.fit.method)
 
     def is_done(self, job: Job, store: Store) -> bool:
         """Tell whether the store holds all of a job by the present definitions."""

@@ -32,7 +32,7 @@ def render(title: str, about: list[str], grid: Grid) -> Rendered:
     rows = [[row, *(_text(grid.cells.get((row, column)), notes) for column in grid.columns)] for row in grid.rows]
     mine = [cell for cell in grid.cells.values() if cell.origin == OURS]
     return Rendered(
-        markdown=_markdown(title, about, grid.columns, rows, notes.lines),
+        markdown=_markdown(title, about, grid, rows, notes.lines),
         latex=_latex(title, grid, notes),
         csv=_csv(grid),
         ours=sum(cell.value is not None for cell in mine),
@@ -80,11 +80,12 @@ def _text(cell: Cell | None, notes: _Notes) -> str:
     return f"{f'**{text}**' if cell.bold else text}{raised}"
 
 
-def _markdown(title: str, about: list[str], columns: list[str], rows: list[list[str]], notes: list[str]) -> str:
+def _markdown(title: str, about: list[str], grid: Grid, rows: list[list[str]], notes: list[str]) -> str:
     lines = [f"# {title}", "", *(f"{line}  " for line in about), ""]
-    lines += ["| |" + "".join(f" {_plain(column)} |" for column in columns), "|---|" + "---:|" * len(columns)]
+    lines += ["| |" + "".join(f" {_plain(column)} |" for column in grid.columns), "|---|" + "---:|" * len(grid.columns)]
     lines += [f"| {' | '.join([_plain(label), *texts])} |" for label, *texts in rows]
     lines += ["", *(f"{index}. {text}" for index, text in enumerate(notes, 1))]
+    lines += ["", *(f"Of the whole table: {text}.  " for text in grid.remarks)]
     return "\n".join(lines).rstrip() + "\n"
 
 
@@ -107,6 +108,7 @@ def _latex(title: str, grid: Grid, notes: _Notes) -> str:
         lines.append(" & ".join([_escape(row), *cells]) + r" \\")
     lines += [r"\bottomrule", r"\end{tabular}"]
     lines += [rf"\par\footnotesize $^{{{i}}}$ {_escape(text)}" for i, text in enumerate(notes.lines, 1)]
+    lines += [rf"\par\footnotesize {_escape(text)}" for text in grid.remarks]
     return "\n".join([*lines, r"\end{table}", ""])
 
 
@@ -141,13 +143,14 @@ def _csv(grid: Grid) -> str:
     """One line per cell: what a program reads."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(["row", "column", "value", "origin", "shapes", "best", "remark"])
+    writer.writerow(["row", "column", "value", "origin", "shapes", "best", "sources", "remark"])
     for row in grid.rows:
         for column in grid.columns:
             cell = grid.cells.get((row, column))
             if cell is not None:
                 value = "" if cell.value is None else f"{cell.value:.6g}"
                 remark = "; ".join([*([cell.reason] if cell.value is None else []), *cell.notes])
-                shapes = cell.shapes or ""
-                writer.writerow([row, column, value, cell.origin, shapes, int(cell.bold), remark])
+                sources = " ".join(cell.sources)
+                facts = [value, cell.origin, cell.shapes or "", int(cell.bold), sources, remark]
+                writer.writerow([row, column, *facts])
     return out.getvalue()

@@ -1,4 +1,4 @@
-"""Measure what a plan lacks: in processes of their own, resumable, past every failure."""
+"""Measure what a plan lacks: in processes of their own, beside other machines, resumable, past every failure."""
 
 import functools
 import multiprocessing
@@ -13,27 +13,44 @@ from contextlib import contextmanager
 from typing import Any
 
 from n2n.tables.plan import Job, Plan, cores
+from n2n.tables.shared import ELSEWHERE, MINE, Share, open_jobs
 from n2n.tables.store import Store
 
 Record = dict[str, Any]
 Told = Callable[[Job, str], None]
 
 
-def run(plan: Plan, store: Store, workers: int, again: bool = False, told: Told | None = None) -> list[tuple[Job, str]]:
-    """Run all jobs that are not done.
+def run(
+    plan: Plan,
+    store: Store,
+    workers: int,
+    again: bool = False,
+    told: Told | None = None,
+    since: float | None = None,
+    threads: int | None = None,
+) -> list[tuple[Job, str]]:
+    """Run all jobs that are neither done nor being run by another process.
 
     Args:
         plan: What is wanted.
         store: Where results go, each as soon as it is there.
         workers: Processes at a time.
         again: Also what was done by other sources.
-        told: Called as told(job, error) after each job; the error is empty where it is done.
+        told: Called as told(job, error) after each job, ours or not; the error is empty where it is done.
+        since: What failed later is not tried again; see `n2n.tables.shared.Share`.
+        threads: Of each process; None: its share of the cores.
 
     Returns:
         The failures, each with its reason.
     """
-    waiting = plan.open(store) + (plan.stale(store) if again else [])
     failures: list[tuple[Job, str]] = []
+    elsewhere: list[Job] = []
+
+    def settle(job: Job, error: str) -> None:
+        if error:
+            failures.append((job, error))
+        if told:
+            told(job, error)
 
     def finish(job: Job, record: Record) -> None:
         error = record.get("error", "")
@@ -41,31 +58,59 @@ def run(plan: Plan, store: Store, workers: int, again: bool = False, told: Told 
         # A failure never replaces numbers.
         if not error or before is None or before["status"] != "done":
             store.write(job.fit, record)
-        if error:
-            failures.append((job, error))
-        if told:
-            told(job, error)
+        share.release(job)
+        settle(job, error)
 
+    def take(job: Job) -> bool:
+        state, error = share.take(job)
+        if state == ELSEWHERE:
+            elsewhere.append(job)
+        elif state != MINE:
+            settle(job, error)
+        return state == MINE
+
+    def measure_all(waiting: list[Job]) -> None:
+        while waiting:
+            # A process that dies takes its pool along. Each of those that were running is tried alone, to see which it
+            # was.
+            lost = _pass(measure, waiting, workers, finish, take, threads)
+            suspects, waiting = lost[:workers], lost[workers:]
+            for job in suspects:
+                for guilty in _pass(measure, [job], 1, finish, take, threads):
+                    finish(guilty, guilty.fit.failed("the process was killed, most likely for want of memory"))
+
+    jobs = open_jobs(plan, store, again)
+    if not jobs:
+        return []
     measure = functools.partial(_measure, samples=plan.profile.samples)
-    while waiting:
-        # A process that dies takes its pool along. Each of those that were running is tried alone, to see which it was.
-        lost = _pass(measure, waiting, workers, finish)
-        suspects, waiting = lost[:workers], lost[workers:]
-        for job in suspects:
-            for guilty in _pass(measure, [job], 1, finish):
-                finish(guilty, guilty.fit.failed("the process was killed, most likely for want of memory"))
+    with Share(plan, store, again, since) as share:
+        measure_all(jobs)
+        # Who had these may have died meanwhile; who still has them will finish them.
+        left = [*elsewhere]
+        elsewhere.clear()
+        measure_all(left)
     return failures
 
 
 def _pass(
-    measure: Callable[[Job], Record], jobs: Sequence[Job], workers: int, finish: Callable[[Job, Record], None]
+    measure: Callable[[Job], Record],
+    jobs: Sequence[Job],
+    workers: int,
+    finish: Callable[[Job, Record], None],
+    take: Callable[[Job], bool],
+    threads: int | None = None,
 ) -> list[Job]:
-    """Run jobs until all are done or a process dies; return those that are left, first those that were running."""
+    """Run jobs until all are done or a process dies; return those that are left, first those that were running.
+
+    Only what `take` accepts is run.
+    """
     waiting, running, lost = deque(jobs), dict[Future[Record], Job](), list[Job]()
-    with _threads(max(1, cores() // workers)), _pool(workers) as pool:
+    with _threads(threads or max(1, cores() // workers)), _pool(workers) as pool:
         while running or (waiting and not lost):
             while waiting and len(running) < workers and not lost:
                 job = waiting.popleft()
+                if not take(job):
+                    continue
                 try:
                     running[pool.submit(measure, job)] = job
                 except BrokenProcessPool:

@@ -54,6 +54,10 @@ class Fit:
         """Return the record of a fit that came to nothing."""
         return {**self.described(), "status": "failed", "error": error}
 
+    def damaged(self, error: str) -> dict[str, Any]:
+        """Return what stands for a record that cannot be read."""
+        return {**self.described(), "status": "damaged", "error": error}
+
 
 @dataclass
 class Wanted:
@@ -61,6 +65,7 @@ class Wanted:
 
     Attributes:
         row, column: Where it stands.
+        method: As of its fits.
         evaluation: `task/protocol`, e.g. `denoise/sbp`; empty where only the cost of the fit counts.
         value: Which value of the evaluation: `p2m`, `oracle.cd_sum2` (a floor), `cost.minutes` (of the fit).
         scale: Factor to the table's unit.
@@ -76,6 +81,7 @@ class Wanted:
     evaluation: str
     value: str
     scale: float
+    method: str = "n2n"
     by_class: bool = False
     whole: bool = True
     fits: list[Fit] = field(default_factory=list)

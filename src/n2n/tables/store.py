@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from n2n.compose import conf_dir, config_hash
-from n2n.errors import InputError, OutputError
+from n2n.errors import OutputError
 from n2n.evaluation.options import load_option
 from n2n.formats import atomic_path
 from n2n.tables.spec import Fit
@@ -20,10 +20,11 @@ _DECIDING = (
     "architectures", "baselines", "evaluation", "fitting", "geometry", "losses", "metrics", "tasks",
     "transport", "config.py",
 )  # fmt: skip
-_NOT_DECIDING = {"table", "profile", "protocol", "logger", "experiment", "debug"}
+_NOT_DECIDING = {"table", "profile", "protocol", "logger", "experiment", "debug", "hydra"}
 
 # What a record of each status must hold.
-_NEEDED = {"done": ("results", "cost", "made"), "failed": ("error",)}
+_NEEDED: dict[str, dict[str, type]] = {"done": {"results": dict, "cost": dict, "made": dict}, "failed": {"error": str}}
+_IN_RESULT = {"definition": str, "asked": list, "values": dict, "floors": dict, "blanks": dict}
 
 
 class Store:
@@ -43,21 +44,18 @@ class Store:
     def read(self, fit: Fit) -> dict[str, Any] | None:
         """Return the result of a fit; None if there is none.
 
-        Raises:
-            InputError: The file is damaged.
+        One that cannot be read is a record of status `damaged` and an error that names the file: it holds no number,
+        and is measured again like any other that is not there.
         """
         path = self.path(fit)
         try:
             record = json.loads(path.read_text(encoding="utf-8"))
+            why = _unfit(record)
         except FileNotFoundError:
             return None
         except (OSError, ValueError) as error:
-            raise InputError(f"{path}: cannot be read ({error}); delete it, it will be measured again") from error
-        needed = _NEEDED.get(record.get("status"), ("a known status",)) if isinstance(record, dict) else ("a record",)
-        for key in needed:
-            if not isinstance(record, dict) or key not in record:
-                raise InputError(f"{path}: lacks {key}; delete it, it will be measured again")
-        return record
+            why = f"cannot be read ({error})"
+        return fit.damaged(f"{path}: {why}") if why else record
 
     def write(self, fit: Fit, record: dict[str, Any]) -> None:
         """Keep a result, whole or not at all.
@@ -72,6 +70,24 @@ class Store:
             raise OutputError(f"{path.parent}: cannot make this folder ({error.strerror})") from error
         with atomic_path(path) as temporary:
             temporary.write_text(json.dumps(record, indent=1, default=float) + "\n", encoding="utf-8")
+
+
+def _unfit(record: Any) -> str:
+    """Say what a record lacks; empty where it is whole."""
+    if not isinstance(record, dict):
+        return "holds no record"
+    if record.get("status") not in tuple(_NEEDED):
+        return "has no known status"
+    for key, kind in _NEEDED[record["status"]].items():
+        if not isinstance(record.get(key), kind):
+            return f"lacks {key}"
+    if record["status"] != "done":
+        return ""
+    for name, result in record["results"].items():
+        for key, kind in _IN_RESULT.items():
+            if not isinstance(result, dict) or not isinstance(result.get(key), kind):
+                return f"lacks {key} of {name}"
+    return "" if "sources" in record["made"] else "does not say which sources made it"
 
 
 def lacking(

@@ -26,6 +26,12 @@ def measure(job, samples):
         Path(place).touch()
         time.sleep(0.5)
         os.kill(os.getpid(), signal.SIGKILL)
+    if kind == "notes":
+        # A line for each time it is measured; the name of the shape goes on after the folder.
+        folder, _, wait = place.partition("#")
+        with (Path(folder) / "log").open("a") as log:
+            log.write(f"{job.fit.shape}\n")
+        time.sleep(float(wait.partition("#")[0]))
     if kind == "sleeps":
         Path(place).write_text(str(os.getpid()))
         time.sleep(60)
@@ -36,12 +42,27 @@ def alone(job):
     return measure(job, None)
 
 
+def plan_of(shapes):
+    """Return a plan of one stand-in per name."""
+    from n2n.tables.plan import Job, Plan
+    from n2n.tables.spec import Fit, Profile
+
+    jobs = [Job(Fit("n2n", "pu", shape, ()), {"": set()}) for shape in shapes]
+    return Plan(Profile("p", "a profile"), [], {}, {job.fit: job for job in jobs})
+
+
 if __name__ == "__main__":
-    # A parent that is killed while its worker sleeps.
-    from table_jobs import alone
+    from table_jobs import alone, measure
 
     from n2n.tables import run
     from n2n.tables.plan import Job
     from n2n.tables.spec import Fit
+    from n2n.tables.store import Store
 
-    run._pass(alone, [Job(Fit("n2n", "pu", sys.argv[1], ()))], 1, print)
+    if sys.argv[1] == "run":
+        # `n2n tables run` as a process of its own: results, workers, shapes.
+        run._measure = measure
+        failures = run.run(plan_of(sys.argv[4:]), Store(sys.argv[2]), int(sys.argv[3]))
+        sys.exit(2 if failures else 0)
+    # A parent that is killed while its worker sleeps.
+    run._pass(alone, [Job(Fit("n2n", "pu", sys.argv[1], ()))], 1, print, take=lambda job: True)

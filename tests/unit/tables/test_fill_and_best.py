@@ -11,8 +11,8 @@ from n2n.tables.store import Store
 EVALUATION = "denoise/sbp"
 
 
-def fit(shape):
-    return Fit("n2n", "pu", shape, ())
+def fit(shape, method="n2n"):
+    return Fit(method, "pu", shape, ())
 
 
 class Bench:
@@ -21,14 +21,28 @@ class Bench:
     def __init__(self, folder):
         self.store, self.wanted = Store(folder), []
 
-    def measured(self, shape, definition="now", cost=None, blank=None, blanks=None, floors=None, **values):
+    def measured(
+        self,
+        shape,
+        definition="now",
+        cost=None,
+        blank=None,
+        blanks=None,
+        floors=None,
+        sources="s",
+        method="n2n",
+        **values,
+    ):
         result = {"definition": definition, "asked": sorted(floors or {}), "values": values, "floors": floors or {}}
         result |= {"blanks": blanks or {}, **({"blank": blank} if blank else {})}
-        record = {"status": "done", "made": {}, "cost": cost or {}, "results": {EVALUATION: result}}
-        self.store.write(fit(shape), record)
+        record = {"status": "done", "made": {"sources": sources}, "cost": cost or {}, "results": {EVALUATION: result}}
+        self.store.write(fit(shape, method), record)
 
-    def wants(self, *shapes, row="ours", column="c", evaluation=EVALUATION, value="p2m", scale=1.0, **more):
-        self.wanted.append(Wanted(row, column, evaluation, value, scale, fits=[fit(s) for s in shapes], **more))
+    def wants(
+        self, *shapes, row="ours", column="c", evaluation=EVALUATION, value="p2m", scale=1.0, method="n2n", **more
+    ):
+        fits = [fit(s, method) for s in shapes]
+        self.wanted.append(Wanted(row, column, evaluation, value, scale, method, fits=fits, **more))
 
     def grid(self, **spec):
         jobs = {f: Job(f, {EVALUATION: set()}) for wanted in self.wanted for f in wanted.fits}
@@ -108,6 +122,34 @@ def test_a_blank_floor_says_why(bench):
     assert bench.cell().reason == "no mesh to draw from"
 
 
+def test_a_damaged_result_is_a_blank_and_leaves_the_others(bench):
+    bench.measured("cow", p2m=1.0)
+    bench.measured("duck", p2m=3.0)
+    bench.store.path(fit("duck")).write_text('{"status": "do')
+    bench.wants("cow", "duck")
+    cell = bench.cell()
+    assert (cell.value, cell.shapes, cell.whole) == (1.0, 1, False)
+    assert cell.notes == ["mean of 1 of 2 shapes; duck: not measured: its result file is damaged"]
+    bench.wants("duck", column="d")
+    assert bench.grid().cells["ours", "d"].reason == "not measured: its result file is damaged"
+
+
+def test_results_of_different_sources_are_told_by_cell_and_by_table(bench):
+    for shape, sources in {"cow": "new", "duck": "old", "pig": "new"}.items():
+        bench.measured(shape, p2m=1.0, sources=sources)
+    bench.wants("cow", "pig", column="same")
+    assert bench.grid().remarks == [] and bench.grid().cells["ours", "same"].sources == ["new"]
+    # Each cell is of one kind, but they are read side by side.
+    bench.wants("duck", column="before")
+    grid = bench.grid()
+    assert len(grid.remarks) == 1 and "different sources of n2n (new, old)" in grid.remarks[0]
+    assert grid.cells["ours", "before"].notes == []
+    bench.wants("cow", "duck", "pig", column="mixed")
+    assert bench.grid().cells["ours", "mixed"].notes == [
+        "mean over results of different sources of n2n: 2 by new, 1 by old"
+    ]
+
+
 def test_reasons_that_are_the_same_are_said_once_and_others_by_shape(bench):
     bench.store.write(fit("duck"), fit("duck").failed("broken"))
     bench.wants("cow", "pig")
@@ -172,6 +214,26 @@ def test_the_metric_says_what_better_is(bench, paper, value, best):
     bench.measured("cow", nc=0.95, fscore=0.95, cd_mean1=0.95, floors={"split": {"nc": 0.99}})
     bench.wants("cow", row="chair", column="ours", value=value)
     assert (("chair", "ours") in marked(bench.grid(published="x", competitors="columns"))) == best
+
+
+def test_another_method_measured_here_competes_and_gets_no_mark(bench, paper):
+    paper({("A", "c"): 3.0})
+    bench.measured("cow", p2m=2.0)
+    bench.measured("cow", p2m=1.0, method="jet")
+    bench.wants("cow", row="ours")
+    assert marked(bench.grid(published="x", competitors="rows")) == {("ours", "c")}
+    bench.wants("cow", row="jet", method="jet")
+    grid = bench.grid(published="x", competitors="rows")
+    assert marked(grid) == set() and grid.cells["jet", "c"].origin == "measured here"
+
+
+def test_a_method_that_is_not_installed_is_a_blank_that_says_how_to_get_it(bench, monkeypatch):
+    monkeypatch.setattr("n2n.tables.fill.not_installed", {"jet": "pip install CGAL", "n2n": ""}.get)
+    bench.wants("cow", method="jet")
+    assert bench.cell().reason == "pip install CGAL"
+    # What another machine has measured is shown all the same.
+    bench.measured("cow", p2m=1.0, method="jet")
+    assert bench.cell().value == 1.0
 
 
 def test_equal_bests_are_both_marked_and_only_ours(bench, paper):

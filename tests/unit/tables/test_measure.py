@@ -57,6 +57,22 @@ def test_numbers_are_those_of_the_protocol(still):
     }
 
 
+def test_files_of_ones_own_are_measured_against_the_truth_given_with_them(still, tmp_path):
+    """The corners of unit cubes in a block of 5 x 5 x 5, all seen 0.1 too high: 0.01 each way."""
+    clean = np.stack(np.meshgrid(*[np.arange(6.0)] * 3), axis=-1).reshape(-1, 3)
+    np.savetxt(tmp_path / "my clean.xyz", clean)
+    np.savetxt(tmp_path / "scan.xyz", clean + [0, 0, 0.1])
+    paths = f"datamodule.paths=[{tmp_path / 'scan.xyz'}]"
+    truth = f"datamodule.reference=[{tmp_path / 'my clean.xyz'}]"
+    record = measure(Fit("still", "files", "block", (paths, truth)), {"denoise/sbp": {"do_nothing"}})
+    result = record["results"]["denoise/sbp"]
+    # The protocol measures in the unit sphere: half a diagonal of 5 becomes 1.
+    assert result["values"]["cd_sum2"] == pytest.approx(2 * 0.01 / (2.5**2 * 3), rel=1e-4)
+    assert record["shape"] == "block" and str(tmp_path / "scan.xyz") in record["source"]
+    blank = measure(Fit("still", "files", "block", (paths,)), {"denoise/sbp": set()})
+    assert blank["results"]["denoise/sbp"]["blank"] == "no ground truth of block is present"
+
+
 def test_samples_can_be_cut_and_floors_left_out():
     cut = module._protocol("onet", set(), 2000)
     assert (cut.reference["samples"], cut.prediction["samples"], dict(cut.floors)) == (2000, 2000, {})

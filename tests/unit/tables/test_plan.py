@@ -1,11 +1,14 @@
 """What has to be measured: every fit once, whoever wants it, and only what is not there."""
 
 import dataclasses
+import sys
+import types
 
 import pytest
 
 from n2n.errors import ConfigError
 from n2n.tables import plan as module
+from n2n.tables.methods import not_installed
 from n2n.tables.plan import Job, estimate, make_plan
 from n2n.tables.spec import Fit, Profile
 from n2n.tables.store import Store
@@ -22,7 +25,7 @@ def shapes(monkeypatch):
 def done(plan, fit, sources="now"):
     """A record that holds all that a plan wants of a fit."""
     results = {
-        e: {"definition": plan.protocols[e], "asked": sorted(floors)}
+        e: {"definition": plan.protocols[e], "asked": sorted(floors), "values": {}, "floors": {}, "blanks": {}}
         for e, floors in plan.jobs[fit].evaluations.items()
         if e
     }
@@ -65,6 +68,24 @@ def test_only_what_is_not_there_is_open(tmp_path):
     store.write(fits[0], done(plan, fits[0]))
     store.write(fits[1], fits[1].failed("broken"))
     assert [job.fit for job in plan.open(store)] == fits[1:]
+
+
+def test_what_needs_a_package_that_is_not_here_is_not_open(tmp_path, monkeypatch, write_table):
+    folder = write_table(experiment={"axes": {"noise": {"1%": 0.01}, "m": {"a": "jet", "b": "n2n"}}, "method": "{m}"})
+    plan, store = make_plan([], PROFILE, folder=folder), Store(tmp_path / "results")
+    for lacking, methods in {"": ["jet", "jet", "n2n", "n2n"], "pip install": ["n2n", "n2n"]}.items():
+        monkeypatch.setattr(module, "not_installed", {"jet": lacking, "n2n": ""}.get)
+        assert [job.fit.method for job in plan.open(store)] == methods
+
+
+def test_a_missing_package_is_said_in_the_words_of_the_baseline(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pymeshlab", None)
+    not_installed.cache_clear()
+    assert not_installed("poisson").endswith("pip install 'n2n[poisson]'") and not_installed("n2n") == ""
+    not_installed.cache_clear()
+    monkeypatch.setitem(sys.modules, "pymeshlab", types.ModuleType("pymeshlab"))
+    assert not_installed("poisson") == ""
+    not_installed.cache_clear()
 
 
 def test_another_definition_of_a_protocol_opens_only_its_evaluations(tmp_path):

@@ -15,7 +15,9 @@ def grid():
     grid = Grid()
     grid.put("A_1", "10%", Cell(1.23456, PAPER, bold=True, notes=["odd & 5% off"]))
     grid.put("A_1", "20%", Cell(None, PAPER, "not in the paper"))
-    grid.put("n2n, N = 1", "10%", Cell(0.00123456, OURS, shapes=4, notes=["second", "odd & 5% off"]))
+    grid.put(
+        "n2n, N = 1", "10%", Cell(0.00123456, OURS, shapes=4, notes=["second", "odd & 5% off"], sources=["new", "old"])
+    )
     grid.put("n2n, N = 1", "20%", Cell(None, OURS, "no data"))
     grid.put("floor|x", "10%", Cell(1234.5, FLOOR, shapes=4))
     return grid
@@ -78,10 +80,18 @@ def test_csv_is_read_by_programs(grid):
     assert len(rows) == 5
     assert rows[0] == {
         "row": "A_1", "column": "10%", "value": "1.23456", "origin": "paper", "shapes": "", "best": "1",
-        "remark": "odd & 5% off",
+        "sources": "", "remark": "odd & 5% off",
     }  # fmt: skip
     assert (rows[1]["value"], rows[1]["remark"]) == ("", "not in the paper")
     assert (rows[2]["row"], rows[2]["value"], rows[2]["shapes"], rows[2]["origin"]) == (
         "n2n, N = 1", "0.00123456", "4", "n2n",
     )  # fmt: skip
+    assert rows[2]["sources"] == "new old"
     assert rows[3]["remark"] == "no data" and rows[4]["origin"] == "reference value"
+
+
+def test_a_remark_on_the_whole_table_stands_under_its_footnotes(grid):
+    grid.remarks.append("made in 50% of the cases")
+    table = render("T", [], grid)
+    assert table.markdown.splitlines()[-2:] == ["", "Of the whole table: made in 50% of the cases.  ".rstrip()]
+    assert "\n\\par\\footnotesize made in 50\\% of the cases\n\\end{table}" in table.latex

@@ -3,13 +3,13 @@
 import pytest
 
 from n2n.compose import conf_dir
-from n2n.errors import InputError, OutputError
+from n2n.errors import OutputError
 from n2n.tables import store as module
 from n2n.tables.spec import Fit
 from n2n.tables.store import Store, deciding, lacking, protocol_hash, sources
 
 FIT = Fit("n2n", "shapenet", "chair/1006be65", ("a=1",))
-DONE = {"status": "done", "results": {}, "cost": {}, "made": {}}
+DONE = {"status": "done", "results": {}, "cost": {}, "made": {"sources": "now"}}
 
 
 def test_one_file_per_fit(tmp_path):
@@ -22,27 +22,37 @@ def test_one_file_per_fit(tmp_path):
     assert store.read(Fit("n2n", "shapenet", "chair/1006be65", ("a=2",))) is None
 
 
+RESULT = '{"definition": "", "asked": [], "values": {}, "floors": {}}'
+
+
 @pytest.mark.parametrize(
     ("text", "what"),
     [
-        ('{"status": "do', "cannot be read"),
-        ("", "cannot be read"),
-        ("\udcff", "cannot be read"),
-        ("[]", "lacks a record"),
-        ("{}", "lacks a known status"),
+        ('{"status": "do', "cannot be read ("),
+        ("", "cannot be read ("),
+        ("\udcff", "cannot be read ("),
+        ("[]", "holds no record"),
+        ("{}", "has no known status"),
+        ('{"status": ["done"]}', "has no known status"),
+        ('{"status": "damaged", "error": "x"}', "has no known status"),
         ('{"status": "done", "results": {}, "cost": {}}', "lacks made"),
+        ('{"status": "done", "results": 3, "cost": {}, "made": {"sources": ""}}', "lacks results"),
+        ('{"status": "done", "results": {}, "cost": {}, "made": {}}', "does not say which sources made it"),
+        (f'{{"status": "done", "results": {{"a/b": {RESULT}}}, "cost": {{}}, "made": {{}}}}', "lacks blanks of a/b"),
+        ('{"status": "done", "results": {"a/b": 1}, "cost": {}, "made": {}}', "lacks definition of a/b"),
         ('{"status": "failed"}', "lacks error"),
     ],
 )
-def test_a_damaged_file_is_named_in_one_line(tmp_path, text, what):
+def test_a_damaged_file_is_a_record_that_names_it_in_one_line(tmp_path, text, what):
     store = Store(tmp_path)
     store.write(FIT, DONE)
     store.path(FIT).write_text(text, encoding="utf-8", errors="surrogateescape")
-    with pytest.raises(InputError) as caught:
-        store.read(FIT)
-    message = str(caught.value)
-    assert message.startswith(f"{store.path(FIT)}: ") and what in message and "\n" not in message
-    assert message.endswith("delete it, it will be measured again")
+    record = store.read(FIT)
+    assert record["status"] == "damaged" and record["id"] == FIT.id
+    assert record["error"].startswith(f"{store.path(FIT)}: {what}") and "\n" not in record["error"]
+    assert lacking(record, {"": set()}, {}) == {""}
+    store.write(FIT, DONE)
+    assert store.read(FIT) == DONE
 
 
 def test_a_folder_that_cannot_be_made(tmp_path):

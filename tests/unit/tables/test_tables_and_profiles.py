@@ -60,6 +60,8 @@ def test_a_profile_is_found_by_its_name():
         ),
         ({"footnotes": [{"row": ["a"], "text": "x"}]}, "a footnote: Unknown key 'row'. Did you mean 'rows'?"),
         ({"footnotes": [{"rows": ["a"]}]}, "a footnote: text is missing"),
+        ({"experiment": {"shapes": 3}}, "shapes is 3; it needs a pattern of names, or a list of names"),
+        ({"experiment": {"datamodule": "files"}}, "name them, shapes: [cup, vase], and their files by the settings"),
         ({"derived": [{"from": "a", "row": "b", "note": "c"}]}, "a derived row: factor is missing"),
     ],
 )
@@ -173,6 +175,35 @@ def test_what_is_missing_is_said_in_the_datamodules_words(cells):
     assert cells(profiles=own)[0].reason == "pu: none of the shapes pig, elk is here"
 
 
+FILES = {
+    "datamodule": "files",
+    "shapes": ["{noise}", "a vase"],
+    "axes": {"noise": {"fine": "cup", "coarse": "bowl"}, "method": {"ours": "n2n", "theirs": "jet"}},
+    "method": "{method}",
+    "settings": ["datamodule.paths=[my scans/{shape}.ply,b.ply] seed=1", "datamodule.reference=[{shape}.off]"],
+    "cells": [{"row": "{method}", "column": "{noise}", "value": "p2m"}],
+}
+
+
+def test_files_are_the_shapes_a_table_lists_each_by_every_method(cells):
+    found = cells(FILES, present=None)
+    assert [(c.row, c.column, c.method) for c in found] == [
+        ("ours", "fine", "n2n"), ("theirs", "fine", "jet"), ("ours", "coarse", "n2n"), ("theirs", "coarse", "jet"),
+    ]  # fmt: skip
+    assert [fit.shape for fit in found[2].fits] == ["bowl", "a vase"] and found[2].whole
+    assert found[3].fits[1] == Fit(
+        "jet",
+        "files",
+        "a vase",
+        ("datamodule.paths=[my scans/a vase.ply,b.ply]", "datamodule.reference=[a vase.off]", "seed=1"),
+    )
+
+
+def test_generated_shapes_stand_in_for_files(cells):
+    first, *_ = cells(FILES, Profile("p", "", datamodule="generated"), lambda name, variant: (["ball"], None))
+    assert first.fits == [Fit("n2n", "generated", "ball", ("seed=1",))]
+
+
 def test_an_experiment_may_belong_to_some_profiles_only(cells):
     assert cells({"only": ["laptop"]}) == []
     assert len(cells({"only": ["p"]})) == 2
@@ -185,6 +216,7 @@ def test_an_experiment_may_belong_to_some_profiles_only(cells):
         ({"settings": ["recipe"]}, "cannot read the setting 'recipe'; write key=value"),
         ({"evaluate": "denoize/sbp"}, "Unknown task 'denoize'. Did you mean 'denoise'?"),
         ({"evaluate": "sbp"}, "p2m is measured by a protocol; give it as evaluate: task/protocol"),
+        ({"method": "{nose}"}, "Unknown axis {nose} in '{nose}'. Did you mean 'noise'?"),
         ({"method": "poison"}, "Unknown method 'poison'. Did you mean 'poisson'?"),
         (
             {"cells": [{"row": "a", "column": "b", "value": "cost.minuts"}]},

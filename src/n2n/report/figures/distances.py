@@ -1,4 +1,7 @@
-"""Chamfer distance against earth mover's distance: the same cloud, the same fit, another L."""
+"""Chamfer distance against earth mover's distance, each without and with R: the same cloud, the same fit, another loss.
+
+R is the geometric consistency of Eq. 6 with the paper's weight.
+"""
 
 from matplotlib.figure import Figure
 
@@ -7,16 +10,18 @@ from n2n.report.figures.errors import point_errors, summary, surface_errors, upp
 from n2n.report.figures.request import Request
 from n2n.report.figures.style import SURFACE, Panel, Scale, cloud_image, gallery, mesh_image
 
-_DISTANCES = {"cd": "Chamfer distance", "emd_squared": "earth mover's distance"}
+_DISTANCES = {"CD": "distance=cd", "EMD": "distance=emd_squared"}
+_REGULARISERS = {"": ("regulariser=none",), " + R": ("regulariser=consistency", "regulariser_weight=0.1")}
 
 
 def draw(request: Request) -> Figure:
-    """Draw denoised points and surface under both distances, between the scan and the truth."""
+    """Draw denoised points and surface under both distances, without and with R, beside the scan and the truth."""
     subject = request.subject()
     camera = Camera.around(subject.extent, up=subject.up)
     fields = {
-        title: request.fit(subject, f"fitting with the {title}", f"distance={name}")
-        for name, title in _DISTANCES.items()
+        name + with_r: request.fit(subject, f"fitting with {name}{with_r}", distance, *regulariser)
+        for name, distance in _DISTANCES.items()
+        for with_r, regulariser in _REGULARISERS.items()
     }
     moved = [field.denoise(subject.noisy) for field in fields.values()]
     meshes = [field.reconstruct(request.resolution) for field in fields.values()]

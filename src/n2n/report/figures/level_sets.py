@@ -1,14 +1,16 @@
 """The signed distance in three plane cuts, with level lines, beside the surface."""
 
 import numpy as np
+import trimesh
 from matplotlib.colors import TwoSlopeNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from n2n.report.camera import Camera
-from n2n.report.figures.request import Request
+from n2n.report.figures.request import Request, Subject
 from n2n.report.figures.slices import Slice, draw_truth, draw_zero
 from n2n.report.figures.style import INK, SIGNED, SURFACE, mesh_image, place, sheet
+from n2n.tasks.field import Field
 
 _LINES = 14
 _SAMPLES = 240
@@ -20,13 +22,17 @@ def draw(request: Request) -> Figure:
     """Draw cuts across z, y and x through the middle, and the zero level set as a surface."""
     subject = request.subject()
     field = request.fit(subject)
-    mesh = field.reconstruct(request.resolution)
+    return level_sets(field, subject, field.reconstruct(request.resolution), request.size)
+
+
+def level_sets(field: Field, subject: Subject, mesh: trimesh.Trimesh, size: int) -> Figure:
+    """Draw the same of a field that is there; `size` is the longer side of the surface's picture in pixels."""
     cuts = [Slice.through(np.asarray(mesh.vertices), axis) for axis in (2, 1, 0)]
     values = [cut.values(field, _SAMPLES) for cut in cuts]
-    height = round(0.8 * request.size)
+    height = round(0.8 * size)
     widths = [round(height * cut.aspect) for cut in cuts]
     picture = mesh_image(
-        mesh.vertices, mesh.faces, SURFACE, Camera.around(np.asarray(mesh.vertices), up=subject.up), request.size
+        mesh.vertices, mesh.faces, SURFACE, Camera.around(np.asarray(mesh.vertices), up=subject.up), size
     )
     shown = round(height * picture.shape[1] / picture.shape[0])
     figure = sheet(sum(widths) + shown + 4 * _GAP + _BAR, height + _TITLE + _BELOW)

@@ -8,7 +8,7 @@ from n2n.errors import ConfigError
 from n2n.geometry.noise import NOISE_MODELS
 from n2n.report.figures import FIGURES, draw_figure, find
 from n2n.report.figures.errors import point_errors, summary, surface_errors, upper
-from n2n.report.figures.request import Subject, read_request
+from n2n.report.figures.request import Request, Subject, read_request
 from n2n.report.figures.slices import Slice
 from n2n.report.figures.style import ERROR, Panel, Scale, gallery, save
 
@@ -31,6 +31,22 @@ def test_every_figure_is_drawn(tmp_path, name):
     draw_figure(name, path, TINY)
     assert is_drawn(picture(path))
     assert [file.name for file in tmp_path.iterdir()] == ["figure.png"]
+
+
+def test_both_distances_are_fitted_without_and_with_the_regulariser(tmp_path, monkeypatch):
+    fitted, fit = [], Request.fit
+
+    def told(self, subject, label="", *settings):
+        config = self.config(*settings)
+        weight = config["regulariser_weight"] if config["regulariser"]["name"] == "consistency" else 0
+        fitted.append((config["distance"]["name"], weight))
+        return fit(self, subject, label, *settings)
+
+    monkeypatch.setattr(Request, "fit", told)
+    draw_figure("distances", tmp_path / "figure.png", TINY)
+    assert fitted == [("cd", 0), ("cd", 0.1), ("emd", 0), ("emd", 0.1)]
+    # Five columns of two rows and a colour bar.
+    assert picture(tmp_path / "figure.png").shape[1] > 5 * 80
 
 
 def test_figures_of_noise_fit_each_kind(tmp_path, monkeypatch):
