@@ -21,20 +21,21 @@ from n2n.tracking.tracker import track
 RUNS = Path("runs")
 
 
-def fit_job(config: dict[str, Any], run_dir: Path | None = None, sweep: str | None = None) -> Path:
+def fit_job(config: dict[str, Any], run_dir: Path | None = None, sweep: str | None = None, data: Any = None) -> Path:
     """Fit one configuration, resuming what is there; return the run folder.
 
     Args:
         config: As composed and validated.
         run_dir: Where; None for runs/<hash of configuration and data>/.
         sweep: Name of the sweep that the run belongs to.
+        data: Its datamodule, where it has been read already.
 
     Raises:
         N2NError: The data or the configuration cannot be used, or the folder cannot be written.
     """
     pick_device(config["device"])
     check_evaluations(config["evaluate"])
-    data = _read_data(config)
+    data = _read_data(config) if data is None else data
     run_dir = run_dir or RUNS / _name(config, data)
     if (run_dir / FIELD_FILE).exists():
         say(f"fit: {run_dir} is finished already; delete it to fit again, or change a setting")

@@ -39,12 +39,12 @@ def run_multirun(
     """
     name, settings = take_name(settings)
     name = name or config_hash({"command": sorted(text for text in settings if not is_about_launcher(text))})
-    grid = make_grid(settings, flags, SWEEPS / name)
+    grid = make_grid(settings, flags, resumed.folder if resumed else SWEEPS / name)
     check_installed(grid.master.hydra)
     sweep = _same(resumed, grid) if resumed else _plan(name, settings, flags, grid)
     jobs = None if grid.jobs is None else _wanted(sweep, grid.jobs, states)
     if jobs == []:
-        return _report(sweep)
+        return _report(grid, sweep)
     task = _task(grid, sweep, len(jobs) if jobs else None)
     try:
         with watching(Watch(sweep, {job.hash for job in jobs} if jobs else None)):
@@ -54,7 +54,7 @@ def run_multirun(
                 optimise(grid, task)
     except KeyboardInterrupt as stop:
         raise KeyboardInterrupt(f"`n2n sweep resume {shlex.quote(name)}` goes on where it stopped") from stop
-    return _report(sweep)
+    return _report(grid, sweep)
 
 
 def _plan(name: str, settings: list[str], flags: list[str], grid: Grid) -> Sweep:
@@ -81,7 +81,9 @@ def _wanted(sweep: Sweep, jobs: list[Job], states: Sequence[str]) -> list[Job]:
     """Return the jobs to fit."""
     runs, prints = {run.hash: run for run in sweep.runs}, Fingerprints()
     done = [job for job in jobs if runs[job.hash].state == "done"]
-    changed = {job.hash for job in done if runs[job.hash].data != prints.of(job.config)}
+    found = {job.hash: prints.of(job.config) for job in done}
+    # Data that cannot be read, on a disk that is away for instance, have not changed.
+    changed = {name for name, data in found.items() if data is not None and data != runs[name].data}
     open_states = [state for state in states if state != "done"]
     wanted = [job for job in jobs if job.hash in changed or runs[job.hash].state in open_states]
     if len(wanted) < len(jobs):
@@ -104,8 +106,8 @@ def _task(grid: Grid, sweep: Sweep, runs: int | None) -> SweepJob:
     return SweepJob(sweep.folder.absolute(), tuple(grid.axes), planned, threads, parent)
 
 
-def _report(sweep: Sweep) -> int:
-    """Sum up; list every failure."""
+def _report(grid: Grid, sweep: Sweep) -> int:
+    """Sum up; list every failure; say what to do next."""
     runs, name = sweep.runs, shlex.quote(sweep.name)
     failed = [run for run in runs if run.state == "failed"]
     elsewhere = sum(run.state == "running" for run in runs)
@@ -117,6 +119,8 @@ def _report(sweep: Sweep) -> int:
     say(f"sweep {sweep.name}: {', '.join(parts)}")
     for run in failed:
         say(f"  failed: {run.label}: {run.error}")
-    verb = "retry" if failed else "resume" if rest else "status" if elsewhere else "results"
+    # An optimiser does not try again what has failed.
+    can_retry = failed and grid.jobs is not None
+    verb = "retry" if can_retry else "resume" if rest else "status" if elsewhere else "results"
     say(f"next: n2n sweep {verb} {name}")
-    return _DONE if verb == "results" else _NOT_DONE
+    return _NOT_DONE if failed or rest or elsewhere else _DONE

@@ -1,5 +1,6 @@
 """One run of a sweep in a worker: of this machine or another."""
 
+import functools
 import os
 import signal
 import threading
@@ -12,7 +13,7 @@ from n2n.cli.console import silenced
 from n2n.compose import validate
 from n2n.errors import ConfigError
 from n2n.sweeps.attempt import attempt
-from n2n.sweeps.data import fingerprint
+from n2n.sweeps.data import fingerprint, read_data
 from n2n.sweeps.grid import run_hash, varied
 from n2n.sweeps.score import score
 
@@ -48,16 +49,20 @@ class SweepJob:
         planned = (self.planned or {}).get(" ".join(settings), name)
         folder = self.sweep / "runs" / planned
 
+        @functools.cache
+        def data() -> Any:
+            return read_data(config)
+
         def fit() -> None:
             if name != planned:
                 raise ConfigError(
                     "the defaults in conf/ or n2n itself changed while the sweep ran: this would be another run; "
                     "give the command again"
                 )
-            fit_job(config, folder, self.sweep.name)
+            fit_job(config, folder, self.sweep.name, data())
 
         with silenced():
-            state = attempt(folder, settings, lambda: fingerprint(config), fit)
+            state = attempt(folder, settings, lambda: fingerprint(data()), fit)
         return score(folder) if state == "done" else None
 
     def _settle(self) -> None:

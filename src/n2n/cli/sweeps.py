@@ -3,6 +3,7 @@
 import argparse
 import shlex
 from contextlib import chdir
+from dataclasses import replace
 from pathlib import Path
 
 _EXAMPLES = """\
@@ -124,7 +125,10 @@ def _resume(sweep, settings: list[str], states: tuple[str, ...]) -> int:
         )
     codes = []
     # Paths in the command are those of the folder it was given in.
-    with chdir(sweep.folder.absolute().parent.parent):
+    folder = sweep.folder.absolute()
+    home = folder.parent.parent
+    sweep = replace(sweep, folder=folder.relative_to(home))
+    with chdir(home):
         for command in sweep.commands:
             kept, flags = split_arguments(command)
             if any(text.startswith("hydra/launcher=") for text in settings):

@@ -20,7 +20,8 @@ TAKEN = "taken"
 def attempt(folder: Path, settings: list[str], fingerprint: Callable[[], str | None], fit: Callable[[], object]) -> str:
     """Fit a run unless it is done or another process is at it; keep in status.json what became of it.
 
-    A run whose data are not those it was fitted to, or was being fitted to, starts anew.
+    A run whose data are not those it was fitted to, or was being fitted to, starts anew. Data that cannot be read have
+    not changed: what was fitted to them stays.
 
     Args:
         folder: Of the run; made here.
@@ -57,7 +58,7 @@ def _attempt(
         data=None,
     )
     try:
-        now = replace(now, data=fingerprint())
+        now = replace(now, data=fingerprint() or before.get("data"))
         if before and before.get("data") != now.data:
             _clear(folder)
         is_finished = (folder / FIELD_FILE).exists()

@@ -3,7 +3,7 @@
 import math
 from pathlib import Path
 
-from n2n.sweeps.store import read_json
+from n2n.sweeps.status import read_json
 
 EVALUATION_FILE = "evaluation.json"
 VALIDATION = "validation"

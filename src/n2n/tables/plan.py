@@ -29,6 +29,11 @@ class Job:
     evaluations: dict[str, set[str]] = field(default_factory=dict)
     tables: set[str] = field(default_factory=set)
 
+    @property
+    def is_timed(self) -> bool:
+        """Tell whether what the fit costs is a result."""
+        return "" in self.evaluations
+
 
 @dataclass
 class Plan:

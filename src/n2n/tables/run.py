@@ -70,6 +70,11 @@ def run(
         return state == MINE
 
     def measure_all(waiting: list[Job]) -> None:
+        measure_with(workers, [job for job in waiting if not job.is_timed])
+        # Beside others a fit takes longer: nothing else runs where the cost is the result.
+        measure_with(1, [job for job in waiting if job.is_timed])
+
+    def measure_with(workers: int, waiting: list[Job]) -> None:
         while waiting:
             # A process that dies takes its pool along. Each of those that were running is tried alone, to see which it
             # was.

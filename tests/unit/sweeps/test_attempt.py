@@ -54,6 +54,23 @@ def test_failure_is_kept_in_one_line_and_tried_again(folder):
     assert (found.state, found.error, found.attempt, fit.found) == ("done", None, 2, [False, True])
 
 
+def test_data_that_cannot_be_read_cost_nothing(folder):
+    fit = Fit(folder)
+    assert [run(folder, fit), run(folder, fit, data=None)] == ["done", "done"]
+    assert fit.calls == 1 and (folder / FIELD_FILE).exists()
+
+
+def test_unfinished_fit_outlives_data_that_are_away(folder):
+    fit = Fit(folder, KeyboardInterrupt())
+    with pytest.raises(KeyboardInterrupt):
+        run(folder, fit)
+    fit.error = InputError("scan.ply: no such file")
+    assert run(folder, fit, data=None) == "failed"
+    fit.error = None
+    assert run(folder, fit) == "done"
+    assert fit.found == [False, True, True]
+
+
 def test_unforeseen_failure_says_where(folder):
     assert run(folder, Fit(folder, ZeroDivisionError("division by zero"))) == "failed"
     error = RunInfo.read(folder).error

@@ -2,6 +2,7 @@
 
 import json
 import random
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -194,7 +195,8 @@ def test_the_sweeper_leaves_a_share_that_was_chosen(tmp_path):
 
 def test_no_score_at_all_is_an_error(tmp_path, monkeypatch):
     launcher = Launcher()
-    monkeypatch.setattr("hydra_plugins.n2n_optuna._score", lambda result: None)
+    # By the module itself: Hydra loads its plugins in a way that leaves no attribute on their package.
+    monkeypatch.setattr(import_module("hydra_plugins.n2n_optuna"), "_score", lambda result: None)
     with pytest.raises(ConfigError, match="none of the 9 runs"):
         sweep(tmp_path, launcher)
     assert Path(tmp_path / "best.json").exists()

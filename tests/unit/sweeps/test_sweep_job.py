@@ -6,6 +6,7 @@ from omegaconf import open_dict, read_write
 
 from n2n.cli import job
 from n2n.cli.sweep_job import SweepJob
+from n2n.registry import DATAMODULES
 from n2n.sweeps.grid import make_grid
 from n2n.sweeps.status import FIELD_FILE
 from n2n.sweeps.store import RunInfo
@@ -15,7 +16,8 @@ from n2n.sweeps.store import RunInfo
 def grid(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
-    def fit_job(config, folder, sweep):
+    def fit_job(config, folder, sweep, data):
+        assert len(data.shapes[0][0]) == config["datamodule"]["points"]
         (folder / FIELD_FILE).write_text(f"{config['seed']} {sweep}")
         (folder / "evaluation.json").write_text('{"validation": 0.5}')
 
@@ -47,3 +49,10 @@ def test_fails_where_the_configuration_is_not_the_planned_one(grid, tmp_path):
     run = RunInfo.read(folder)
     assert (run.hash, run.state) == ("another", "failed")
     assert "changed while the sweep ran" in run.error
+
+
+def test_data_are_read_once(grid, tmp_path, monkeypatch):
+    read, build = [], DATAMODULES.build
+    monkeypatch.setattr(DATAMODULES, "build", lambda *given, **named: read.append(1) or build(*given, **named))
+    assert work(grid, None, tmp_path / "x") == 0.5
+    assert len(read) == 1

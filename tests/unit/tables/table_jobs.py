@@ -8,8 +8,10 @@ from pathlib import Path
 
 
 def record(job):
+    from n2n.tables.store import protocol_hash
+
     results = {
-        e: {"definition": "", "asked": [], "values": {}, "floors": {}, "blanks": {}} for e in job.evaluations if e
+        e: {"definition": protocol_hash(e.split("/")[1]), "asked": [], "values": {}, "floors": {}, "blanks": {}} for e in job.evaluations if e
     }
     made = {"sources": "", "n2n": "0", "commit": "0", "machine": "m"}
     done = {"status": "done", "results": results, "cost": {"minutes": 1.0}, "made": made}
@@ -42,12 +44,12 @@ def alone(job):
     return measure(job, None)
 
 
-def plan_of(shapes):
-    """Return a plan of one stand-in per name."""
+def plan_of(shapes, evaluation="denoise/sbp"):
+    """Return a plan of one stand-in per name; without an evaluation, their cost is the result."""
     from n2n.tables.plan import Job, Plan
     from n2n.tables.spec import Fit, Profile
 
-    jobs = [Job(Fit("n2n", "pu", shape, ()), {"": set()}) for shape in shapes]
+    jobs = [Job(Fit("n2n", "pu", shape, ()), {evaluation: set()}) for shape in shapes]
     return Plan(Profile("p", "a profile"), [], {}, {job.fit: job for job in jobs})
 
 

@@ -21,8 +21,8 @@ def plan(monkeypatch):
     """Return a function that plans one stand-in per name."""
     monkeypatch.setattr(module, "_measure", table_jobs.measure)
 
-    def planned(*shapes):
-        jobs = [Job(Fit("n2n", "pu", str(shape), ()), {"": set()}) for shape in shapes]
+    def planned(*shapes, evaluation="denoise/sbp"):
+        jobs = [Job(Fit("n2n", "pu", str(shape), ()), {evaluation: set()}) for shape in shapes]
         return Plan(Profile("p", "a profile"), [], {}, {job.fit: job for job in jobs})
 
     return planned
@@ -45,6 +45,12 @@ def wait_for(condition, seconds=20.0):
     while not condition() and time.monotonic() < end:
         time.sleep(0.02)
     return condition()
+
+
+def test_where_the_cost_is_the_result_nothing_runs_beside(plan, tmp_path):
+    timed = plan("a", "b", "c", evaluation="")
+    assert module.run(timed, store := Store(tmp_path), workers=3) == []
+    assert len({store.read(fit)["pid"] for fit in timed.jobs}) == 1
 
 
 def test_a_failure_is_recorded_and_tried_again_and_what_is_done_is_not(plan, tmp_path):
