@@ -14,6 +14,9 @@ import numpy as np
 import pytest
 
 from n2n.cli.main import main
+from n2n.cli.multirun import _report
+from n2n.sweeps.grid import Grid
+from n2n.sweeps.status import Status
 from n2n.sweeps.store import Sweep
 
 FIT = ["iterations=10", "plan_reuse=5", "logger=none"]
@@ -34,7 +37,7 @@ def attempts(name):
     return [run.attempt for run in Sweep.open(name).runs]
 
 
-def test_failures_are_listed_and_only_what_is_open_is_fitted(capsys):
+def test_failures_are_listed_and_only_what_is_open_is_fitted(capsys, tmp_path, monkeypatch):
     scan("a.xyz")
     paths = "datamodule.paths=[a.xyz],[b.xyz]"
     command = ["fit", "-m", "sweep=scans", "datamodule=files", paths, "hydra/launcher=basic", *FIT]
@@ -75,6 +78,14 @@ def test_failures_are_listed_and_only_what_is_open_is_fitted(capsys):
     assert main(["sweep"]) == 0
     assert "scans  2     2" in capsys.readouterr().out
 
+    Path("a.xyz").rename("away.xyz")  # what was fitted to it stays, and nothing is tried
+    monkeypatch.chdir(tmp_path.parent)
+    folder = f"{tmp_path.name}/sweeps/scans"
+    for verb in ("resume", "retry"):
+        assert main(["sweep", verb, folder]) == 0
+        assert "0 of 2 runs to fit" in capsys.readouterr().err
+    assert attempts(folder) == [2, 2]
+
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
@@ -103,6 +114,14 @@ def test_a_sweep_is_resumed_with_its_own_settings(capsys):
     assert main(["sweep", "results", "x", "hydra/launcher=basic"]) == 2
     assert "takes no settings" in capsys.readouterr().err
     assert main(["sweep", "status", "x", "-o", "x.csv"]) == 2
+
+
+@pytest.mark.parametrize(("jobs", "verb"), [([], "retry"), (None, "results")])
+def test_an_optimiser_does_not_try_again_what_failed(capsys, jobs, verb):
+    sweep = Sweep.plan("x", ["-m", "sweep=x", "seed=0,1"], {"seed": ["0", "1"]}, {"h": ["seed=0"]})
+    Status("failed", 1, "here", 1, "", ["seed=0"], None, error="no such file").write(sweep.run_dir("h"))
+    assert _report(Grid(None, None, {}, [], jobs), sweep) == 2
+    assert f"next: n2n sweep {verb} x" in capsys.readouterr().err
 
 
 def begin(*arguments):

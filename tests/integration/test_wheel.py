@@ -42,4 +42,8 @@ def test_the_demo_scan_is_inside(unpacked, tmp_path):
 
 
 def test_nothing_of_the_tests_or_the_runs_is_inside(unpacked):
-    assert {path.name for path in unpacked.iterdir()} == {"n2n", next(unpacked.glob("n2n-*.dist-info")).name}
+    assert {path.name for path in unpacked.iterdir()} == {
+        "n2n",
+        "hydra_plugins",
+        next(unpacked.glob("n2n-*.dist-info")).name,
+    }

@@ -3,6 +3,8 @@
 import json
 import shutil
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +16,8 @@ from n2n.errors import ConfigError, OutputError
 from n2n.fitting.fit import LAST_CHECKPOINT, fit, pick_device
 from n2n.formats import atomic_path
 from n2n.registry import DATAMODULES
+from n2n.sweeps.claims import claim
+from n2n.sweeps.status import CLAIM, make_folder
 from n2n.tasks.field import FIELD_FILE, Field
 from n2n.tracking.results import check_evaluations
 from n2n.tracking.tracker import track
@@ -41,8 +45,25 @@ def fit_job(config: dict[str, Any], run_dir: Path | None = None, sweep: str | No
         say(f"fit: {run_dir} is finished already; delete it to fit again, or change a setting")
         return run_dir
     is_new = not run_dir.exists()
+    make_folder(run_dir)
+    # Whoever fits a sweep has claimed its runs.
+    with _alone(run_dir) if sweep is None else nullcontext():
+        _fit(config, data, run_dir, sweep, is_new)
+    return run_dir
+
+
+@contextmanager
+def _alone(run_dir: Path) -> Iterator[None]:
+    """Own a run; two processes would mix up its log and its checkpoints."""
+    with claim(run_dir / CLAIM) as mine:
+        if not mine:
+            raise ConfigError(f"{run_dir}: another process is fitting this; wait for it, or change a setting")
+        yield
+
+
+def _fit(config: dict[str, Any], data: Any, run_dir: Path, sweep: str | None, is_new: bool) -> None:
+    """Fit into a folder of our own."""
     try:
-        run_dir.mkdir(parents=True, exist_ok=True)
         OmegaConf.save(OmegaConf.create(config), run_dir / "config.yaml")
     except OSError as error:
         raise OutputError(f"{run_dir}: cannot be written ({error.strerror}); run n2n in another folder") from error
@@ -69,7 +90,6 @@ def fit_job(config: dict[str, Any], run_dir: Path | None = None, sweep: str | No
     field.save(run_dir)
     say(f"fit: {field.report['iterations']:,} iterations -> {run_dir}  ({seconds:.0f} s)")
     say(f"next: n2n reconstruct --run {run_dir} -o mesh.ply")
-    return run_dir
 
 
 def _name(config: dict[str, Any], data: Any) -> str:

@@ -47,7 +47,7 @@ def run_multirun(
         return _report(grid, sweep)
     task = _task(grid, sweep, len(jobs) if jobs else None)
     try:
-        with watching(Watch(sweep, {job.hash for job in jobs} if jobs else None)):
+        with watching(Watch(sweep, [job.hash for job in jobs] if jobs else None)):
             if jobs:
                 launch(grid, sweep, jobs, task)
             else:

@@ -12,7 +12,7 @@ examples:
   n2n sweep                                            the sweeps here
   n2n sweep status seeds                               every run: state, settings, how far, why it failed
   n2n sweep resume seeds                               fit what is not done; unfinished fits go on where they stopped
-  n2n sweep resume seeds hydra/launcher=basic          the same, one run after the other in this process
+  n2n sweep resume seeds hydra/launcher=serial         the same, one run after the other in this process
   n2n sweep retry seeds                                also what failed
   n2n sweep results seeds -o seeds.csv                 settings and results, one row a run; .csv or .json
 

@@ -6,9 +6,9 @@ from pathlib import Path
 from n2n.dashboard.records import is_results, read_records
 from n2n.dashboard.run import Run, fill_from_folder, is_there
 from n2n.errors import InputError, N2NError
-from n2n.sweeps.store import STATES, RunInfo, Sweep
+from n2n.sweeps.store import STATES, SWEEPS, RunInfo, Sweep
 
-RUNS, SWEEPS = Path("runs"), Path("sweeps")
+RUNS = Path("runs")
 _MARKS = ("config.yaml", "status.json")  # any of them makes a folder a run
 _DAMAGE = (N2NError, OSError, ValueError, TypeError, AttributeError)  # what a damaged status or sweep.json raises
 

@@ -9,10 +9,10 @@ from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
-from n2n.errors import N2NError, OutputError
+from n2n.errors import N2NError
 from n2n.messages import unexpected
 from n2n.sweeps.claims import claim
-from n2n.sweeps.status import CLAIM, FIELD_FILE, Status, read_status
+from n2n.sweeps.status import CLAIM, FIELD_FILE, Status, make_folder, read_status
 
 TAKEN = "taken"
 
@@ -35,10 +35,7 @@ def attempt(folder: Path, settings: list[str], fingerprint: Callable[[], str | N
     Raises:
         OutputError: The folder cannot be written.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot make this folder ({error.strerror}); work in another one") from error
+    make_folder(folder)
     with claim(folder / CLAIM) as mine:
         return _attempt(folder, settings, fingerprint, fit) if mine else TAKEN
 
@@ -46,36 +43,36 @@ def attempt(folder: Path, settings: list[str], fingerprint: Callable[[], str | N
 def _attempt(
     folder: Path, settings: list[str], fingerprint: Callable[[], str | None], fit: Callable[[], object]
 ) -> str:
-    before = read_status(folder)
+    before, field = read_status(folder), folder / FIELD_FILE
+    is_done = before.get("state") == "done" and field.exists()
     start = time.perf_counter()
     now = Status(
         state="running",
-        attempt=before.get("attempt", 0),
+        attempt=before.get("attempt", 0) + 1,
         host=socket.gethostname(),
         pid=os.getpid(),
         started=_now(),
         settings=settings,
-        data=None,
+        data=before.get("data"),
     )
     try:
-        now = replace(now, data=fingerprint() or before.get("data"))
-        if before and before.get("data") != now.data:
+        if not is_done:
+            now.write(folder)  # before the data are read: that may already take more memory than there is
+        data = fingerprint() or now.data
+        if before and data != now.data:
             _clear(folder)
-        is_finished = (folder / FIELD_FILE).exists()
-        if is_finished and before.get("state") == "done":
+        now = replace(now, data=data)
+        if field.exists():
+            if not is_done:  # the process that fitted it ended between its last file and the status
+                attempt, seconds = before.get("attempt", 1), before.get("seconds")
+                replace(now, state="done", attempt=attempt, ended=_now(), seconds=seconds).write(folder)
             return "done"
-        if not is_finished:
-            now = replace(now, attempt=now.attempt + 1)
-            now.write(folder)
-            fit()
-        # Else the process that fitted it ended between its last file and this one.
-        seconds = before.get("seconds") if is_finished else round(time.perf_counter() - start, 2)
-        replace(now, state="done", ended=_now(), seconds=seconds).write(folder)
+        now.write(folder)
+        fit()
+        replace(now, state="done", ended=_now(), seconds=_since(start)).write(folder)
     except Exception as error:
         text = " ".join(message(error).split())
-        seconds = round(time.perf_counter() - start, 2)
-        attempt = max(now.attempt, before.get("attempt", 0) + 1)
-        replace(now, state="failed", attempt=attempt, ended=_now(), seconds=seconds, error=text).write(folder)
+        replace(now, state="failed", ended=_now(), seconds=_since(start), error=text).write(folder)
         return "failed"
     return "done"
 
@@ -116,3 +113,7 @@ def _clear(folder: Path) -> None:
 
 def _now() -> str:
     return datetime.now().astimezone().isoformat(timespec="seconds")
+
+
+def _since(start: float) -> float:
+    return round(time.perf_counter() - start, 2)

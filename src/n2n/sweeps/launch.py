@@ -24,7 +24,7 @@ _STARTS = 5  # of workers that all die before they begin anything
 _KILLED = "its process was killed each time, alone as well; most likely for want of memory"
 _NO_WORKERS = (
     "the workers die before they begin a run; `n2n doctor` says whether the installation is sound, and "
-    "hydra/launcher=basic fits one run after the other without them"
+    "hydra/launcher=serial fits one run after the other without them"
 )
 
 

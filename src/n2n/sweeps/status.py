@@ -56,12 +56,21 @@ def write_json(path: Path, content: Any) -> None:
     Raises:
         OutputError: The folder cannot be written.
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{path.parent}: cannot make this folder ({error.strerror}); work in another one") from error
+    make_folder(path.parent)
     with atomic_path(path) as temporary:
         temporary.write_text(json.dumps(content, indent=1) + "\n")
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder unless it is there.
+
+    Raises:
+        OutputError: It cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot make this folder ({error.strerror}); work in another one") from error
 
 
 def run_state(folder: Path, told: str | None) -> str:

@@ -2,18 +2,22 @@
 
 import csv
 import json
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 
 from n2n.errors import ConfigError, InputError
 from n2n.registry import suggest
-from n2n.sweeps.claims import heartbeat_age
-from n2n.sweeps.status import CLAIM, read_json, read_status, run_state, write_json
+from n2n.sweeps.claims import claim, heartbeat_age
+from n2n.sweeps.status import CLAIM, make_folder, read_json, read_status, run_state, write_json
 
 SWEEPS = Path("sweeps")
 STATES = ("done", "running", "stale", "failed", "pending")
 _SWEEP = "sweep.json"
+_WAIT = 0.05  # seconds
 
 
 @dataclass(frozen=True)
@@ -139,29 +143,35 @@ class Sweep:
     @classmethod
     def plan(cls, name: str, command: list[str], axes: dict[str, list[str]], planned: dict[str, list[str]]) -> "Sweep":
         """Write down what a sweep is; one of this name that is there already is extended."""
-        folder, created, earlier = SWEEPS / name, datetime.now().astimezone().isoformat(timespec="seconds"), []
-        if (folder / _SWEEP).exists():
-            before = cls.open(folder)
-            created = before.created
-            earlier = [one for one in before.commands if one != command]
-            planned = {**before.planned, **planned}
-            axes = {
-                key: list(dict.fromkeys([*before.axes.get(key, []), *axes.get(key, [])]))
-                for key in dict.fromkeys([*before.axes, *axes])
-            }
-        sweep = cls(folder, command, created, axes, planned, earlier)
+        folder = SWEEPS / name
+        make_folder(folder)
+        with _turn(folder / CLAIM):
+            created, earlier = datetime.now().astimezone().isoformat(timespec="seconds"), []
+            if (folder / _SWEEP).exists():
+                before = cls.open(folder)
+                created = before.created
+                earlier = [one for one in before.commands if one != command]
+                planned = {**before.planned, **planned}
+                axes = {
+                    key: list(dict.fromkeys([*before.axes.get(key, []), *axes.get(key, [])]))
+                    for key in dict.fromkeys([*before.axes, *axes])
+                }
+            sweep = cls(folder, command, created, axes, planned, earlier)
+            sweep._write()
+        return sweep
+
+    def _write(self) -> None:
         write_json(
-            folder / _SWEEP,
+            self.folder / _SWEEP,
             {
-                "name": name,
-                "command": command,
-                "earlier": earlier,
-                "created": created,
-                "axes": axes,
-                "runs": {run: {"settings": settings} for run, settings in planned.items()},
+                "name": self.name,
+                "command": self.command,
+                "earlier": self.earlier,
+                "created": self.created,
+                "axes": self.axes,
+                "runs": {run: {"settings": settings} for run, settings in self.planned.items()},
             },
         )
-        return sweep
 
 
 def all_sweeps() -> list[Sweep]:
@@ -178,6 +188,17 @@ def as_dict(settings: list[str]) -> dict[str, str]:
     """
     pairs = (text.lstrip("+").partition("=") for text in settings)
     return {key: value for key, _, value in pairs}
+
+
+@contextmanager
+def _turn(path: Path) -> Iterator[None]:
+    """Wait until nobody else owns `path`, then own it: of two commands that extend a sweep one would be forgotten."""
+    while True:
+        with claim(path) as mine:
+            if mine:
+                yield
+                return
+        time.sleep(_WAIT)
 
 
 def _last_rows(folder: Path) -> list[dict[str, str]]:

@@ -1,6 +1,7 @@
 """How a sweep goes on, from the folders of its runs: the same whatever computes them, and wherever."""
 
 from collections import Counter
+from collections.abc import Collection
 from dataclasses import dataclass, field
 
 from n2n.sweeps.store import RunInfo, Sweep
@@ -12,13 +13,13 @@ class Watch:
 
     Attributes:
         sweep: What is watched.
-        wanted: Hashes of runs that are to end; None for all that appear.
+        wanted: Hashes of runs that are to end, told in this order; None for all that appear.
         ended: Those that have.
         states: How many runs are in which state, as of the last look.
     """
 
     sweep: Sweep
-    wanted: set[str] | None
+    wanted: Collection[str] | None
     ended: dict[str, RunInfo] = field(default_factory=dict)
     states: Counter[str] = field(default_factory=Counter)
 

@@ -71,6 +71,19 @@ def test_unfinished_fit_outlives_data_that_are_away(folder):
     assert fit.found == [False, True, True]
 
 
+def test_killed_while_the_data_are_read_counts_as_begun(folder):
+    def killed():
+        assert RunInfo.read(folder).state == "running"
+        raise KeyboardInterrupt
+
+    fit = Fit(folder)
+    for attempts in (1, 2):
+        with pytest.raises(KeyboardInterrupt):
+            attempt(folder, ["seed=1"], killed, fit)
+        assert (RunInfo.read(folder).state, RunInfo.read(folder).attempt) == ("stale", attempts)
+    assert (run(folder, fit), fit.calls, read_status(folder)["data"]) == ("done", 1, "d")
+
+
 def test_unforeseen_failure_says_where(folder):
     assert run(folder, Fit(folder, ZeroDivisionError("division by zero"))) == "failed"
     error = RunInfo.read(folder).error

@@ -2,6 +2,7 @@
 
 import os
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -62,6 +63,15 @@ def test_extended_keeps_runs_and_commands():
     assert [run.hash for run in both.runs] == ["h0", "h1", "h2"]
     assert both.created == first.created
     assert plan().commands == [["-m", "seed=1,2"], ["-m", "seed=0,1"]]
+
+
+def test_extended_by_several_at_once():
+    values = [str(value) for value in range(8)]
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(lambda value: plan(command=("-m", f"seed={value}"), values=(value,)), values))
+    sweep = Sweep.open("seeds")
+    assert sorted(sweep.planned) == [f"h{value}" for value in values]
+    assert sorted(command[1] for command in sweep.commands) == [f"seed={value}" for value in values]
 
 
 def test_all_of_them_oldest_first():

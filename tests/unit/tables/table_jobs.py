@@ -11,7 +11,9 @@ def record(job):
     from n2n.tables.store import protocol_hash
 
     results = {
-        e: {"definition": protocol_hash(e.split("/")[1]), "asked": [], "values": {}, "floors": {}, "blanks": {}} for e in job.evaluations if e
+        e: {"definition": protocol_hash(e.split("/")[1]), "asked": [], "values": {}, "floors": {}, "blanks": {}}
+        for e in job.evaluations
+        if e
     }
     made = {"sources": "", "n2n": "0", "commit": "0", "machine": "m"}
     done = {"status": "done", "results": results, "cost": {"minutes": 1.0}, "made": made}

@@ -16,6 +16,8 @@ from n2n.compose import compose
 from n2n.datamodules.generated import GeneratedDataModule
 from n2n.errors import ConfigError
 from n2n.losses.state import FieldState
+from n2n.sweeps.claims import claim
+from n2n.sweeps.status import CLAIM
 from n2n.tracking import media, names, tracker
 from n2n.tracking.callback import eikonal_deviation, gradient_norm
 
@@ -201,3 +203,11 @@ def test_an_interrupted_fit_goes_on_with_another_logger(tmp_path, monkeypatch):
     run(part, "checkpoint_every=5", "logger=csv", "media=false", "evaluate=[denoise/sbp]")
     fields = [torch.load(folder / "field.ckpt")["weights"] for folder in (whole, part)]
     assert all(np.array_equal(fields[0][key], fields[1][key]) for key in fields[0])
+
+
+def test_a_run_is_fitted_by_one_process_at_a_time(tmp_path):
+    folder = tmp_path / "run"
+    folder.mkdir()
+    with claim(folder / CLAIM), pytest.raises(ConfigError, match="another process is fitting this"):
+        run(folder)
+    assert [path.name for path in folder.iterdir()] == ["claim.1"]
