@@ -21,6 +21,16 @@ from n2n.registry import ARCHITECTURES
 
 _BUDGETS = (1, 6)
 _RATES = {"grid": ("auto",), "hash": ("2e-3", "1e-2"), "mlp": ("1e-4", "1e-3"), "siren": ("1e-4", "5e-4")}
+_CHOSEN = {
+    # Not in conf/architecture: another network's option without its arguments.
+    "hash": [
+        "architecture=siren",
+        *(f"~architecture.{key}" for key in ("frequency", "layers", "width")),
+        "architecture.name=hash",
+    ],
+    "mlp": ["architecture=mlp"],
+    "siren": ["architecture=siren"],
+}
 _PRIMES = (1, 2_654_435_761, 805_459_861)
 
 
@@ -89,25 +99,16 @@ def main() -> None:
     torch.set_num_threads(1)
     for case in options.cases.split(","):
         shape, noise = case.split(":")
-        clean, noisy, vertices, faces = _case(shape, float(noise), 10_000, np.random.default_rng(7))
+        _, noisy, vertices, faces = _case(shape, float(noise), 10_000, np.random.default_rng(7))
         usual = _fit(noisy, vertices, faces, ["architecture=grid"], case, "grid")
         for name in ("hash", "mlp", "siren"):
-            common = [f"architecture.name={name}", "batch_size=2048", *_only_name(name)]
+            common = [*_CHOSEN[name], "batch_size=2048"]
             step = _step_seconds(noisy, common)
             for budget in _BUDGETS:
                 iterations = max(20, math.floor(budget * usual / step))
                 for rate in _RATES[name]:
                     settings = [*common, f"iterations={iterations}", f"optimizer.lr={rate}"]
                     _fit(noisy, vertices, faces, settings, case, f"{name} {rate} {iterations} iterations")
-
-
-def _only_name(name: str) -> list[str]:
-    """Start from the options of conf/ where there are any; of the grid's own arguments a network has none."""
-    return (
-        ["architecture=siren", "~architecture.frequency", "~architecture.layers", "~architecture.width"]
-        if name == "hash"
-        else [f"architecture={name}"]
-    )
 
 
 def _step_seconds(noisy: np.ndarray, settings: list[str]) -> float:
