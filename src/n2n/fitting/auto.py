@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from n2n.config import AUTO
 from n2n.errors import ConfigError
 from n2n.fitting.objective import DENOISED_POINTS
+from n2n.geometry.scaffold import MAX_POINTS
 from n2n.geometry.scale import Scales, estimate_scales
 
 _PROBED_POINTS = 40_000
@@ -26,6 +27,7 @@ _UNFOLDED = 0.3
 _FAR_FIELD = 60.0
 _MAX_CELLS = 3e6  # a whole street in one grid would need more; it gets a coarser one instead
 _BAND_VOXELS = 3.0
+_SIGNED = 1.5  # sample spacings of the scaffold: closer to the surface its winding number may be wrong
 _MAX_BATCH = 32_768
 _SEEN_BATCHES = 16  # over which the weights are averaged: more points than these are not seen often enough to count
 _GLOBAL_BATCH = 1000  # matched as one leaf: its cost grows with the cube
@@ -135,7 +137,12 @@ def choose(scales: Scales, observations: list[NDArray[np.float64]]) -> Chosen:
         upper=tuple(float(x) for x in upper),
         voxel=voxel,
         band=_BAND_VOXELS * voxel,
-        margin=max(3 * noise, 2 * voxel, 2 * float(np.sqrt(scales.area / sampled))),
+        margin=max(
+            3 * noise,
+            2 * voxel,
+            2 * float(np.sqrt(scales.area / sampled)),
+            _SIGNED * float(np.sqrt(scales.area / MAX_POINTS)),
+        ),
         batch_size=min(total, _MAX_BATCH),
         plan_reuse=int(np.clip(_PLAN_REUSE * _MAX_BATCH // total, 4, _PLAN_REUSE)),
         observations=len(observations),

@@ -12,7 +12,7 @@ from n2n.geometry.local_fit import project_to_quadric
 from n2n.geometry.orientation import orient, winding_number
 from n2n.geometry.scale import Scales
 
-_MAX_POINTS = 3000
+MAX_POINTS = 3000
 _AREA_NEIGHBOURS = 9
 _FAR_POSITIONS = 20_000
 _OPEN = 0.3  # mean normal of a surface that is clearly not closed
@@ -54,7 +54,7 @@ class Scaffold:
         """
         generator = np.random.default_rng(seed)
         tree = cKDTree(cloud)
-        samples = cloud[_thin(cloud, _MAX_POINTS, generator)]
+        samples = cloud[_thin(cloud, MAX_POINTS, generator)]
         asked = generator.uniform(cloud.min(axis=0), cloud.max(axis=0), (_ASKED, 3))
         off = max(_OFF * scales.noise, np.sqrt(scales.area / len(samples)))
         asked = asked[tree.query(asked)[0] > off]

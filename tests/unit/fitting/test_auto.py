@@ -7,6 +7,7 @@ import pytest
 
 from n2n.compose import compose
 from n2n.fitting.auto import choose, fill, measure
+from n2n.geometry.scaffold import MAX_POINTS
 from n2n.geometry.scale import Scales
 from n2n.geometry.shapes import sample_surface, scan
 
@@ -29,6 +30,12 @@ def test_more_noise_means_larger_cells_and_margins():
     values = _values(noise=0.02), _values(noise=0.04)
     assert values[1]["queries.scale"] == pytest.approx(2 * values[0]["queries.scale"])
     assert values[1]["terms.smoothness.weight"] > values[0]["terms.smoothness.weight"]
+
+
+def test_signs_are_not_asked_for_between_the_samples_of_the_scaffold():
+    # Many observations allow small cells and margins, but the winding number is that of a few thousand samples.
+    scales = Scales(noise=0.01, spacing=0.003, patch=48, area=4.0)
+    assert choose(scales, [np.zeros((10_000, 3))] * 40).margin >= np.sqrt(4.0 / MAX_POINTS)
 
 
 def test_denser_data_allow_smaller_cells():
