@@ -4,9 +4,7 @@ import math
 from pathlib import Path
 
 from n2n.sweeps.status import read_json
-
-EVALUATION_FILE = "evaluation.json"
-VALIDATION = "validation"
+from n2n.tracking.names import EVALUATION_FILE, VALIDATION
 
 
 def score(run_dir: Path, of: str | None = None) -> float | None:

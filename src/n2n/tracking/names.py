@@ -1,5 +1,7 @@
 """Names of everything that is logged: columns of metrics.csv, keys in W&B and TensorBoard."""
 
+EVALUATION_FILE = "evaluation.json"  # in a run folder
+
 # While fitting. A further term of the loss is logged under its own name (eikonal, smoothness, ...), unweighted.
 STEP = "step"
 LOSS = "loss"  # Eq. 7: distance plus the weighted terms

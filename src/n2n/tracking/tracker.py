@@ -14,10 +14,9 @@ from n2n.formats import atomic_path
 from n2n.tasks.field import Field
 from n2n.tracking.callback import WATCHED, FitLog
 from n2n.tracking.loggers import close_logger, open_logger
+from n2n.tracking.names import EVALUATION_FILE
 from n2n.tracking.results import evaluate, results
 from n2n.tracking.wandb import wandb_at
-
-EVALUATION_FILE = "evaluation.json"
 
 
 class Tracker:
