@@ -18,8 +18,8 @@ from n2n.geometry.scaffold import MAX_POINTS
 from n2n.geometry.scale import Scales, estimate_scales
 
 _PROBED_POINTS = 40_000
-_NOISE = 0.88  # of the measured noise: a cloud bears a little less smoothing than its noise seems to ask for
-_NOISE_FLOOR = 0.05  # of the spacing: a clean cloud still has one length that limits what can be known
+_NOISE = 0.88  # a cloud bears a little less smoothing than its noise seems to ask for
+_NOISE_FLOOR = 0.057  # of the spacing: a clean cloud still has one length that limits what can be known
 _VOXEL = 0.28
 _STIFFNESS = 1.75
 _THIN_PLATE = 0.011
@@ -30,6 +30,7 @@ _BAND_VOXELS = 3.0
 _SIGNED = 1.5  # sample spacings of the scaffold: closer to the surface its winding number may be wrong
 _MAX_BATCH = 32_768
 _SEEN_BATCHES = 16  # over which the weights are averaged: more points than these are not seen often enough to count
+_LEFT, _FITTED = 0.975, 0.03  # of the noise, what a fitted field leaves over, and what it loses per spacing / noise
 _GLOBAL_BATCH = 1000  # matched as one leaf: its cost grows with the cube
 _PLAN_REUSE = 20
 _GRID_ITERATIONS, _GRID_RATE = 160, 0.02
@@ -41,7 +42,7 @@ class Chosen:
     """What the data decided, unit coordinates.
 
     Attributes:
-        noise: Deviation of the noise along the normal, at least 5 % of the spacing.
+        noise: Deviation of the noise along the normal, at least 5.7 % of the spacing.
         spacing: Square root of the area per point over all observations, of those the fit sees at its end.
         area: Surface area.
         lower, upper: Box of the field.
@@ -69,16 +70,17 @@ class Chosen:
 
     def values(self, config: dict[str, Any]) -> dict[str, Any]:
         """Return the values of the configuration's `auto` fields by dotted name."""
-        stiffness = (_STIFFNESS * self.noise) ** 2
+        noise = _NOISE * self.noise
+        stiffness = (_STIFFNESS * noise) ** 2
         # The weights balance a squared distance; a distance of exponent 1 is larger by 1 / noise.
-        unit = self.noise ** (config["distance"].get("p", 1) - 2)
+        unit = noise ** (config["distance"].get("p", 1) - 2)
         unsorted = config["pairing"].get("name") == "global"
         linear = config["architecture"].get("name") == "grid"
         # A fold of f to and fro inside the noise gains a share of noise^2 / area, less the more points are there, and
         # costs 1 / voxel of bending. Cells wider than the noise leave no room for one.
-        room = min(1.0, self.noise / self.voxel) ** 4
-        unfolded = _UNFOLDED * room * self.noise * self.voxel / self.merged**0.5
-        smoothness = max(_THIN_PLATE * self.spacing, unfolded) * self.noise / self.area
+        room = min(1.0, noise / self.voxel) ** 4
+        unfolded = _UNFOLDED * room * noise * self.voxel / self.merged**0.5
+        smoothness = max(_THIN_PLATE * self.spacing, unfolded) * noise / self.area
         effort = config["effort"]
         return {
             "iterations": max(1, round(effort * (_GRID_ITERATIONS if linear else _NETWORK_ITERATIONS))),
@@ -88,14 +90,24 @@ class Chosen:
             "queries.kind": "neighbour" if self.observations == 1 else "observation",
             # Of one cloud the curvature is known too badly to be trusted in full.
             "target_noise": self.noise * (1 + self.spacing / self.noise) ** -0.5,
-            "queries.scale": 0.5 * self.noise,
+            "queries.scale": 0.5 * noise,
             "architecture.voxel": self.voxel,
             "terms.eikonal.weight": stiffness * unit,
             "terms.smoothness.weight": smoothness * unit,
             "terms.scaffold.weight": unit,
             "terms.scaffold.normal_weight": stiffness,
-            "terms.far_field.weight": _FAR_FIELD * self.noise**2 * unit,
+            "terms.far_field.weight": _FAR_FIELD * noise**2 * unit,
         }
+
+    def revised(self, residual: float, assumed: float) -> float:
+        """Return the noise behind what a fitted field leaves over: at most what patches saw, who can only see too much.
+
+        Args:
+            residual: Root mean square distance of the points from the zero set; NaN for unknown.
+            assumed: Noise that the field was fitted with. It follows its points, more where they are sparse.
+        """
+        noise = residual / _LEFT * (1 + _FITTED * self.spacing / (_NOISE * assumed))
+        return float(np.clip(noise, _NOISE_FLOOR * self.spacing, self.noise)) if noise > 0 else self.noise
 
 
 def measure(observations: list[NDArray[np.float64]], seed: int = 0) -> tuple[Scales, NDArray[np.float64]]:
@@ -120,7 +132,8 @@ def measure(observations: list[NDArray[np.float64]], seed: int = 0) -> tuple[Sca
 
 def choose(scales: Scales, observations: list[NDArray[np.float64]]) -> Chosen:
     """Turn measured scales into the parameters of the fast recipe."""
-    noise = max(_NOISE * scales.noise, _NOISE_FLOOR * scales.spacing)
+    noise = max(scales.noise, _NOISE_FLOOR * scales.spacing)
+    smoothed = _NOISE * noise
     pad = max(0.12, 4 * scales.noise, scales.spacing)
     total = sum(map(len, observations))
     seen = min(total, _SEEN_BATCHES * _MAX_BATCH)
@@ -128,7 +141,7 @@ def choose(scales: Scales, observations: list[NDArray[np.float64]]) -> Chosen:
     lower = np.min([points.min(axis=0) for points in observations], axis=0) - pad
     upper = np.max([points.max(axis=0) for points in observations], axis=0) + pad
     spacing = scales.spacing * (total / seen) ** 0.5
-    voxel = max(_VOXEL * (noise * spacing) ** 0.25, float(np.prod(upper - lower) / _MAX_CELLS) ** (1 / 3))
+    voxel = max(_VOXEL * (smoothed * spacing) ** 0.25, float(np.prod(upper - lower) / _MAX_CELLS) ** (1 / 3))
     return Chosen(
         noise=noise,
         spacing=spacing,
@@ -138,7 +151,7 @@ def choose(scales: Scales, observations: list[NDArray[np.float64]]) -> Chosen:
         voxel=voxel,
         band=_BAND_VOXELS * voxel,
         margin=max(
-            3 * noise,
+            3 * smoothed,
             2 * voxel,
             2 * float(np.sqrt(scales.area / sampled)),
             _SIGNED * float(np.sqrt(scales.area / MAX_POINTS)),

@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +25,10 @@ from n2n.fitting.assemble import build_field, build_objective, build_optimizer
 from n2n.fitting.callbacks import ProgressReport, Report
 from n2n.fitting.checkpoint import AtomicCheckpointIO, read_state
 from n2n.fitting.module import FitModule
+from n2n.fitting.objective import Objective
 from n2n.fitting.prepare import fill_config, prepare
 from n2n.fitting.redistance import redistance
+from n2n.fitting.revision import Revision
 from n2n.geometry.frame import Frame
 
 LAST_CHECKPOINT = "last.ckpt"
@@ -85,14 +88,20 @@ def fit(
     identity = config_hash({**{k: v for k, v in config.items() if k not in _NOT_THE_FIT}, "data": data.fingerprint()})
     data, held_out = data.hold_out(config["validation"], seed)
     shapes = prepare(data, config)
-    config = fill_config(config, shapes, device)
+    guides = [shape.guide(device, seed) for shape in shapes]
+
+    def build(config: dict[str, Any]) -> Objective:
+        objective = build_objective(config, guides)
+        # A term of weight 0 sees what the others see and leaves the sum as it is, to the last bit.
+        objective.terms = {**{name: (0.0, measure) for name, measure in (watched or {}).items()}, **objective.terms}
+        return objective
+
+    revision = Revision(shapes, partial(fill_config, config, device=device), build)
+    config = revision.config
     field = build_field(config, len(shapes))
     for condition, shape in enumerate(shapes):
         shape.start(field, condition)
-    objective = build_objective(config, [shape.guide(device, seed) for shape in shapes])
-    losses = ("loss", "distance", *objective.terms)
-    # A term of weight 0 sees what the others see and leaves the sum as it is, to the last bit.
-    objective.terms = {**{name: (0.0, measure) for name, measure in (watched or {}).items()}, **objective.terms}
+    objective = build(config)
     optimizer, scheduler = build_optimizer(config)
     iterations, plan_reuse = config["iterations"], config["plan_reuse"]
     module = FitModule(
@@ -108,7 +117,7 @@ def fit(
         except OSError as error:
             raise OutputError(f"{run_dir}: cannot make this folder ({error.strerror}); choose another one") from error
     data.configure_draws(config["pairs"], config["batch_size"], seed, first, plan_reuse)
-    callbacks = [*callbacks, *([ProgressReport(report)] if report else [])]
+    callbacks = [revision, *callbacks, *([ProgressReport(report)] if report else [])]
     if run_dir:
         every = max(1, config["checkpoint_every"] // plan_reuse)
         callbacks.append(
@@ -134,7 +143,11 @@ def fit(
         if first < iterations:
             _train(trainer, module, data, resume)
         else:
-            module.load_state_dict(read_state(resume)["state_dict"])
+            state = read_state(resume)
+            module.load_state_dict(state["state_dict"])
+            revision.load_state_dict(state["callbacks"][revision.state_key])
+    shapes, config = revision.shapes, revision.config
+    losses = {"loss", "distance", *objective.terms} - set(watched or ())
     field = module.result.eval().to(device)
     if config["redistance"]:
         boxes = [(shape.chosen.lower, shape.chosen.upper) for shape in shapes]
@@ -153,7 +166,7 @@ def fit(
             "observations": [len(clouds) for clouds in data.shapes],
             "left_out": data.left_out,
             "outliers": data.outliers,
-            "noise": [s.scales.noise * f.scale for s, f in zip(shapes, data.frames, strict=True)],
+            "noise": [min(s.scales.noise, s.chosen.noise) * f.scale for s, f in zip(shapes, data.frames, strict=True)],
             "spacing": [s.scales.spacing * f.scale for s, f in zip(shapes, data.frames, strict=True)],
             "held_out": [len(points) for points in held_out],
             "losses": {name: float(value) for name, value in trainer.callback_metrics.items() if name in losses},

@@ -44,7 +44,7 @@ def test_denser_data_allow_smaller_cells():
 
 def test_a_clean_cloud_still_has_a_length():
     chosen, _ = _choose(noise=0.0, spacing=0.04)
-    assert chosen.noise == pytest.approx(0.05 * 0.04)
+    assert chosen.noise == pytest.approx(0.057 * 0.04)
     assert 0 < chosen.voxel < _choose(noise=0.02)[0].voxel
 
 

@@ -1,0 +1,80 @@
+"""Second thoughts about the noise: the field that is being fitted measures it better than local patches can."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import lightning as L
+import torch
+
+from n2n.architectures.base import SDF
+from n2n.fitting.objective import Objective
+from n2n.fitting.prepare import Shape
+from n2n.geometry.residual import residual_noise
+
+_BEGIN = 0.7  # of the measured noise: a field that is too smooth takes thin parts for noise, and goes on doing so
+_WHEN = (0.25, 0.4)  # of the fit; sooner it has not settled, later it could not follow any more
+_ROOM = 2.0  # noise deviations
+_PROBES = 16_384
+
+
+class Revision(L.Callback):
+    """Begin with less noise than patches saw, ask the field twice how noisy the points are, and go on with its answer.
+
+    Args:
+        shapes: As measured.
+        fill: Shapes -> the configuration that suits them.
+        build: Configuration -> objective.
+
+    Attributes:
+        shapes: With the noise of now.
+        config: The configuration of now.
+    """
+
+    def __init__(
+        self,
+        shapes: list[Shape],
+        fill: Callable[[list[Shape]], dict[str, Any]],
+        build: Callable[[dict[str, Any]], Objective],
+    ) -> None:
+        self._measured, self._fill, self._build = shapes, fill, build
+        self._asked = 0
+        self._go_on_with([_BEGIN * shape.chosen.noise for shape in shapes])
+
+    def on_train_start(self, trainer: Any, pl_module: Any) -> None:
+        if self._asked:  # in the part of the fit that a checkpoint holds
+            pl_module.objective = self._build(self.config)
+
+    def on_train_batch_start(self, trainer: Any, pl_module: Any, *unused: Any) -> None:
+        progress = pl_module.global_step / pl_module.iterations
+        if self._asked < len(_WHEN) and progress >= _WHEN[self._asked]:
+            self._asked += 1
+            before = self.config
+            self._go_on_with([self._ask(pl_module.field, index) for index in range(len(self.shapes))])
+            if self.config != before:
+                pl_module.objective = self._build(self.config)
+
+    def state_dict(self) -> dict[str, Any]:
+        return {"asked": self._asked, "noise": [shape.chosen.noise for shape in self.shapes]}
+
+    def load_state_dict(self, state_dict: dict[str, Any]) -> None:
+        self._asked = state_dict["asked"]
+        self._go_on_with(state_dict["noise"])
+
+    def _go_on_with(self, noise: list[float]) -> None:
+        self.shapes = [
+            replace(shape, chosen=replace(shape.chosen, noise=value))
+            for shape, value in zip(self._measured, noise, strict=True)
+        ]
+        self.config = self._fill(self.shapes)
+
+    @torch.no_grad()
+    def _ask(self, field: SDF, condition: int) -> float:
+        sample, noise = self.shapes[condition].sample, self.shapes[condition].chosen.noise
+        device = next(field.parameters()).device
+        points = torch.as_tensor(sample[:: math.ceil(len(sample) / _PROBES)], dtype=torch.float32, device=device)
+        codes = torch.full((len(points),), condition, dtype=torch.long, device=device)
+        with field.shared():
+            residual = residual_noise(lambda x: field.value_and_gradient(x, codes), points, _ROOM * noise)
+        return self._measured[condition].chosen.revised(residual, noise)
