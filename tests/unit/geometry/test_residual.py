@@ -58,4 +58,4 @@ def test_it_does_not_ask_for_a_true_distance():
 
 
 def test_without_room_it_is_unknown():
-    assert math.isnan(residual_noise(_sphere, 0.5 * torch.eye(3), 2.0))
+    assert math.isnan(residual_noise(_sphere, 0.49 * torch.eye(3), 0.75))
