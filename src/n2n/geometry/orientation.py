@@ -26,6 +26,8 @@ _GRAPH_NEIGHBOURS = 10
 _APART = 3.0  # weight of what tells two sheets from one
 _SHEET, _CURVED = 1.5, 0.25  # blurs, spacings; points closer than that along the normal are on one sheet
 _PATCH = 40  # points that flip as one at first
+_ROWS = 256  # at a time, of everything against everything: what fits the processor's cache
+_TINY = 1e-12
 
 
 def orient(
@@ -67,16 +69,17 @@ def dipole_energy(
     """Return the symmetric coupling matrix M, (n, n) float32, softened at the scale of point spacing and blur."""
     p, n, a = (torch.as_tensor(x, dtype=torch.float32) for x in (points, normals, areas))
     softening = float(a.median()) + blur**2
-    squared = torch.cdist(p, p).square() + softening
-    own = (p * n).sum(1)
-    # (p_i - p_j) . n_i and (p_i - p_j) . n_j from matrix products instead of an (n, n, 3) array.
-    along_i = own[:, None] - n @ p.T
-    along_j = p @ n.T - own[None]
-    parallel, offset = n @ n.T, along_i * along_j
-    apart = 1 - torch.exp(-offset.abs() / (2 * ((_SHEET * blur) ** 2 + _CURVED**2 * float(a.median()))))
-    offset = offset + _APART * softening * apart * parallel
-    coupling = (parallel - 3 * offset / squared) / squared.pow(1.5)
-    coupling *= a[:, None] * a[None]
+    own, flat = (p * n).sum(1), 2 * ((_SHEET * blur) ** 2 + _CURVED**2 * float(a.median()))
+    coupling = torch.empty((len(p), len(p)))
+    for start in range(0, len(p), _ROWS):
+        i = slice(start, start + _ROWS)
+        squared = torch.cdist(p[i], p).square_().add_(softening)
+        # (p_i - p_j) . n_i and (p_i - p_j) . n_j from matrix products instead of an (n, n, 3) array.
+        offset = (own[i, None] - n[i] @ p.T).mul_(p[i] @ n.T - own[None])
+        parallel = n[i] @ n.T
+        apart = 1 - torch.exp(offset.abs().div_(-flat))
+        offset += apart.mul_(parallel).mul_(_APART * softening)
+        coupling[i] = (parallel - 3 * offset / squared) * squared.rsqrt().pow_(3) * a[i, None] * a[None]
     coupling.fill_diagonal_(0)
     return coupling
 
@@ -232,11 +235,14 @@ def winding_number(
     Source: Barill et al. 2018, Fast Winding Numbers for Soups and Clouds, Eq. 3 (summed directly).
     """
     p, n, a = (torch.as_tensor(x, dtype=torch.float32) for x in (points, normals, areas))
+    # |q - p|^2 + area / 4 and the flux area (p - q) . n / 4 pi are both linear in (q, 1), up to |q|^2.
+    squared = torch.cat([-2 * p, (p.square().sum(1) + 0.25 * a)[:, None]], 1).T.contiguous()
+    flux = torch.cat([-n, (p * n).sum(1)[:, None]], 1).T * (a / (4 * np.pi))
     result = np.empty(len(queries))
-    own = (p * n).sum(1)
-    for start in range(0, len(queries), 4096):
-        q = torch.as_tensor(queries[start : start + 4096], dtype=torch.float32)
-        distance = torch.cdist(q, p)
-        distance = (distance.square() + 0.25 * a).sqrt()
-        result[start : start + 4096] = (((own - q @ n.T) / distance.pow(3)) @ a / (4 * np.pi)).numpy()
+    for start in range(0, len(queries), _ROWS):
+        q = torch.as_tensor(queries[start : start + _ROWS], dtype=torch.float32)
+        ahead = torch.cat([q, torch.ones((len(q), 1))], 1)
+        inverse = torch.addmm(q.square().sum(1)[:, None], ahead, squared).clamp_min_(_TINY).rsqrt_()
+        term = (ahead @ flux).mul_(inverse).mul_(inverse).mul_(inverse)
+        result[start : start + _ROWS] = term.sum(1).numpy()
     return result
