@@ -3,7 +3,7 @@
 import hashlib
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from importlib.metadata import entry_points
@@ -64,12 +64,13 @@ def compose(overrides: Sequence[str] = ()) -> dict[str, Any]:
     """
     from hydra import compose as hydra_compose
     from hydra import initialize_config_dir
+    from hydra.core.global_hydra import GlobalHydra
 
     register_schema()
     with _own_hydra():
         try:
             with initialize_config_dir(str(conf_dir()), version_base="1.3", job_name="n2n"):
-                _check_choices(overrides)
+                check_choices(overrides, GlobalHydra.instance().config_loader())
                 composed = hydra_compose("config", overrides=hydra_arguments(overrides))
         except Exception as error:
             raise ConfigError(explain(error)) from error
@@ -96,12 +97,17 @@ def validate(composed: Any) -> dict[str, Any]:
     return config
 
 
-def _check_choices(overrides: Sequence[str]) -> None:
-    """Refuse options that no folder of conf/ holds: of an optional group (debug=defualt) Hydra ignores them."""
-    from hydra.core.global_hydra import GlobalHydra
+def check_choices(overrides: Iterable[str], loader: Any) -> None:
+    """Refuse options that no folder of conf/ holds: of an optional group (debug=defualt) Hydra ignores them.
 
+    Args:
+        overrides: `key=value`, others than choices of a group among them.
+        loader: Hydra's loader of configurations.
+
+    Raises:
+        ConfigError: An unknown option, with the nearest known one.
+    """
     search = [f"hydra.searchpath=[{','.join(plugin_search_paths())}]"]
-    loader = GlobalHydra.instance().hydra.config_loader
     for text in overrides:
         choice = _CHOICE.fullmatch(text)
         if choice is None:

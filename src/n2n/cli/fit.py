@@ -40,7 +40,6 @@ def run_fit(arguments: list[str]) -> int:
     settings, flags = split_arguments(arguments)
     check_flags(flags)
     name, rest = take_name(settings)
-    check_jobs(rest, flags)
     if is_sweep(settings, flags):
         if looks := [flag for flag in flags if flag.partition("=")[0] in _LOOKS]:
             raise ConfigError(f"{looks[0]} shows one configuration; leave -m out and give every setting one value")
@@ -49,6 +48,7 @@ def run_fit(arguments: list[str]) -> int:
         return run_multirun(settings, flags)
     if name:
         raise ConfigError(f"sweep={name} names a sweep, and this is one fit; add -m, or leave it out")
+    check_jobs(rest, flags)
     return _run_one(rest, flags)
 
 

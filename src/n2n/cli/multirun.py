@@ -9,7 +9,7 @@ from n2n.cli.sweep_job import SweepJob
 from n2n.cli.sweep_progress import watching
 from n2n.compose import config_hash
 from n2n.errors import ConfigError
-from n2n.sweeps.command import is_about_launcher, take_name
+from n2n.sweeps.command import check_jobs, is_about_launcher, take_name
 from n2n.sweeps.data import Fingerprints
 from n2n.sweeps.grid import Grid, Job, make_grid
 from n2n.sweeps.launch import is_joblib, launch, optimise, set_processes
@@ -40,6 +40,8 @@ def run_multirun(
     name, settings = take_name(settings)
     name = name or config_hash({"command": sorted(text for text in settings if not is_about_launcher(text))})
     grid = make_grid(settings, flags, resumed.folder if resumed else SWEEPS / name)
+    if grid.jobs is None:
+        check_jobs(settings, flags)
     check_installed(grid.master.hydra)
     sweep = _same(resumed, grid) if resumed else _plan(name, settings, flags, grid)
     jobs = None if grid.jobs is None else _wanted(sweep, grid.jobs, states)

@@ -115,7 +115,7 @@ def _resume(sweep, settings: list[str], states: tuple[str, ...]) -> int:
     """Run the sweep's commands again, for runs in these states."""
     from n2n.cli.multirun import run_multirun
     from n2n.errors import ConfigError
-    from n2n.sweeps.command import check_jobs, is_about_launcher, split_arguments, take_name
+    from n2n.sweeps.command import is_about_launcher, split_arguments, take_name
 
     other = [text for text in settings if not is_about_launcher(text)]
     if other:
@@ -133,9 +133,8 @@ def _resume(sweep, settings: list[str], states: tuple[str, ...]) -> int:
             kept, flags = split_arguments(command)
             if any(text.startswith("hydra/launcher=") for text in settings):
                 kept = [text for text in kept if not is_about_launcher(text)]
-            wanted = [*take_name(kept)[1], *settings]
-            check_jobs(wanted, flags)
-            codes.append(run_multirun([*wanted, f"sweep={sweep.name}"], flags, states, sweep))
+            wanted = [*take_name(kept)[1], *settings, f"sweep={sweep.name}"]
+            codes.append(run_multirun(wanted, flags, states, sweep))
     return codes[-1]
 
 

@@ -18,7 +18,7 @@ _OTHER_CONF = ("--config-dir", "-cd", "--config-path", "-cp", "--config-name", "
 
 
 def check_jobs(settings: list[str], flags: list[str]) -> None:
-    """Compose what the command line asks for; of a sweep, every value once.
+    """Compose what the command line asks for; of a sweep whose runs nobody knows yet, every value once.
 
     Raises:
         ConfigError: The first thing that is wrong, in one line. Hydra would say it in twenty, and after other jobs ran.

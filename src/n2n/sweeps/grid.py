@@ -3,6 +3,7 @@
 from argparse import Namespace
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.types import RunMode
 from omegaconf import OmegaConf, open_dict, read_write
 
-from n2n.compose import conf_dir, config_hash, hydra_arguments, register_schema, validate
+from n2n.compose import check_choices, conf_dir, config_hash, hydra_arguments, register_schema, validate
 from n2n.errors import ConfigError
 from n2n.messages import explain
 
@@ -94,6 +95,7 @@ def make_grid(settings: Sequence[str], flags: Sequence[str], folder: Path) -> Gr
         jobs = None
         if master.hydra.sweeper._target_ == _BASIC:
             expanded = BasicSweeper.split_arguments(given, None)[0]
+            check_choices(dict.fromkeys(chain(*expanded)), hydra.config_loader)
             jobs = _unique([_job(hydra.config_loader, master, one, axes) for one in expanded])
     except ConfigError:
         raise

@@ -62,7 +62,11 @@ def test_what_is_wrong_with_one_run_is_said_of_the_command(settings):
 
 def test_unknown_options_are_named_before_the_first_run():
     with pytest.raises(ConfigError, match="Did you mean 'emd'"):
-        check_jobs(["distance=cd,emdd"], ["-m"])
+        grid("distance=cd,emdd")
+    with pytest.raises(ConfigError, match="Did you mean 'default'"):
+        grid("seed=0,1", "debug=defualt")
+    with pytest.raises(ConfigError, match="Did you mean 'emd'"):
+        check_jobs(["distance=choice(cd,emdd)"], ["-m"])
     with pytest.raises(ConfigError, match="no such folder"):
         grid("seed=0,1", flags=["-m", "--config-dir", "/nowhere"])
 
