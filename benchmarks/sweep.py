@@ -18,10 +18,12 @@ from n2n.sweeps.store import RunInfo, Sweep
 
 TITLE = "Sweep"
 TRIAL = {"runs": 2, "rounds": 1, "settings": ["iterations=5", "plan_reuse=5", "datamodule.points=300"]}
+# Way -> launcher, threads of a fit; None for as many as there are cores.
+_WAYS = {"serial": ("serial", "1"), "threads": ("serial", None), "parallel": ("joblib", None)}
 _THROUGHPUT, _OVERHEAD = 1.7, 3.0  # what is to be reached: times the serial throughput; seconds a run
 
 
-def run(runs: int = 24, rounds: int = 3, settings: Sequence[str] = ("debug=default",)) -> dict[str, Any]:
+def run(runs: int = 24, rounds: int = 3, settings: Sequence[str] = ()) -> dict[str, Any]:
     """Measure.
 
     Args:
@@ -29,63 +31,71 @@ def run(runs: int = 24, rounds: int = 3, settings: Sequence[str] = ("debug=defau
         rounds: Turns.
         settings: `key=value` settings of every fit.
     """
-    ways = [partial(_sweep, runs, [*settings, f"hydra/launcher={launcher}"]) for launcher in ("basic", "joblib")]
-    serial, parallel = in_turns(*ways, rounds=rounds)
+    ways = [partial(_sweep, runs, [*settings, f"hydra/launcher={name}"], threads) for name, threads in _WAYS.values()]
+    measured = dict(zip(_WAYS, in_turns(*ways, rounds=rounds), strict=True))
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    seconds = {way: [one["seconds"] for one in turns] for way, turns in measured.items()}
     return {
         "runs": runs,
         "settings": list(settings),
         "cores": cores,
-        "serial": _summary(serial),
-        "parallel": _summary(parallel),
-        "throughput": ratio([one["seconds"] for one in serial], [one["seconds"] for one in parallel]),
+        "ways": {way: _summary(turns) for way, turns in measured.items()},
+        "throughput": {way: ratio(seconds[way], seconds["parallel"]) for way in ("serial", "threads")},
     }
 
 
 def render(result: dict[str, Any]) -> str:
+    names = {
+        "serial": "one after the other, one core each",
+        "threads": "one after the other, all cores each",
+        "parallel": f"{result['cores']} processes, one core each",
+    }
     rows = [
-        [name, *(span(result[key][what], " s") for what in ("seconds", "processor", "fit", "beside", "start"))]
-        for name, key in (("one after the other", "serial"), (f"{result['cores']} processes", "parallel"))
+        [name, *(span(result["ways"][way][what], " s") for what in ("seconds", "processor", "fit", "beside", "start"))]
+        for way, name in names.items()
     ]
-    gain, beside = result["throughput"], result["parallel"]["beside"]["median"]
-    load = span(result["parallel"]["load"])
+    gain, beside = result["throughput"]["serial"], result["ways"]["parallel"]["beside"]["median"]
+    load = span(result["ways"]["parallel"]["load"])
     return "\n".join(
         [
-            f"{result['runs']} runs of `n2n fit -m {' '.join(result['settings'])}` that differ in their seed, with "
-            "`hydra/launcher=basic`, one process with all cores, and with the default, `joblib`. The whole command "
-            "counts; a fit is what `summary.json` calls its seconds.",
+            f"{result['runs']} runs of `{' '.join(['n2n fit -m', *result['settings']])}` that differ in their seed, with "
+            "`hydra/launcher=serial` and with the default, `joblib`. The whole command counts; a fit is what "
+            "`summary.json` calls its seconds.",
             "",
             table(
                 ["", "whole sweep", "processor time", "one fit", "a worker beside it, per run", "to the first run"],
                 rows,
             ),
             "",
-            f"Throughput: {span(gain)} times that of one after the other"
-            f"{_verdict(gain['median'] >= _THROUGHPUT, f'at least {_THROUGHPUT} on 2 cores')}. A run costs a worker "
-            f"{number(beside)} s beside its fit{_verdict(beside < _OVERHEAD, f'less than {_OVERHEAD:g} s')}. "
+            f"Throughput: {span(gain)} times that of the same fits one after the other"
+            f"{_verdict(gain['median'] >= _THROUGHPUT, f'at least {_THROUGHPUT} on 2 cores')}; "
+            f"{span(result['throughput']['threads'])} times that of fits that take all cores each. A run costs a "
+            f"worker {number(beside)} s beside its fit{_verdict(beside < _OVERHEAD, f'less than {_OVERHEAD:g} s')}. "
             f"Processes that wanted to run meanwhile (load): {load}.",
         ]
     )
 
 
-def launch(folder: Path, arguments: Sequence[str]) -> None:
-    """Run `n2n` in a folder.
+def launch(folder: Path, arguments: Sequence[str], threads: str | None = None) -> None:
+    """Run `n2n` in a folder, with so many threads if that is said.
 
     Raises:
         RuntimeError: It failed.
     """
     command = [str(Path(sys.executable).parent / "n2n"), *arguments]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    rest = {name: value for name, value in os.environ.items() if name != "OMP_NUM_THREADS"}
+    environment = {**rest, "OMP_NUM_THREADS": threads} if threads else rest
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
     if done.returncode:
         raise RuntimeError(f"{' '.join(command)} failed with code {done.returncode}: {done.stderr.strip()[-600:]}")
 
 
-def _sweep(runs: int, settings: Sequence[str]) -> dict[str, float]:
+def _sweep(runs: int, settings: Sequence[str], threads: str | None) -> dict[str, float]:
     """Run one sweep; return seconds: of all, a fit, a worker beside its fits, until a run began; the load."""
     seeds = ",".join(map(str, range(runs)))
     with tempfile.TemporaryDirectory() as name:
         folder, begin, start, before = Path(name), time.time(), time.perf_counter(), os.times()
-        launch(folder, ["fit", "-m", "sweep=bench", f"seed={seeds}", *settings])
+        launch(folder, ["fit", "-m", "sweep=bench", f"seed={seeds}", *settings], threads)
         seconds, after = time.perf_counter() - start, os.times()
         processor = sum(after[2:4]) - sum(before[2:4])
         found = Sweep.open(folder / "sweeps/bench").runs

@@ -1,6 +1,7 @@
 """Analytic shapes with a known signed distance, and simulated noisy scans of them."""
 
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,10 +57,12 @@ SHAPES: dict[str, tuple[_Distance, tuple, tuple]] = {
 }
 
 
+@lru_cache(maxsize=4)
 def sample_surface(shape: str, count: int, seed: int = 0) -> NDArray[np.float64]:
     """Return `count` points on the surface, evenly by area.
 
     Points of a thin shell around the surface are even by area; they are then moved onto the surface along the gradient.
+    The last few are kept, read-only: a scan and its truth are the same points.
     """
     distance, lower, upper = SHAPES[shape]
     random = np.random.default_rng(seed)
@@ -71,6 +74,7 @@ def sample_surface(shape: str, count: int, seed: int = 0) -> NDArray[np.float64]
     points = np.concatenate(chosen)[:count]
     for _ in range(6):
         points = points - distance(points)[:, None] * _gradient(distance, points, shell)
+    points.flags.writeable = False
     return points
 
 
