@@ -13,7 +13,7 @@ from n2n.sweeps.command import check_jobs, is_about_launcher, take_name
 from n2n.sweeps.data import Fingerprints
 from n2n.sweeps.grid import Grid, Job, make_grid
 from n2n.sweeps.launch import is_joblib, launch, optimise, set_processes
-from n2n.sweeps.launchers import check_installed
+from n2n.sweeps.launchers import check_installed, told_threads
 from n2n.sweeps.store import STATES, SWEEPS, Sweep
 from n2n.sweeps.watch import Watch
 
@@ -102,7 +102,7 @@ def _task(grid: Grid, sweep: Sweep, runs: int | None) -> SweepJob:
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
         processes, share = set_processes(grid, cores, runs or cores)
         # Whoever says how many threads is obeyed.
-        threads, parent = int(os.environ.get("OMP_NUM_THREADS") or share), os.getpid()
+        threads, parent = told_threads() or share, os.getpid()
         say(f"sweep: {processes} at a time, threads of each: {threads}")
     planned = None if grid.jobs is None else {" ".join(job.settings): job.hash for job in grid.jobs}
     return SweepJob(sweep.folder.absolute(), tuple(grid.axes), planned, threads, parent)

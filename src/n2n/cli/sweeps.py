@@ -2,6 +2,7 @@
 
 import argparse
 import shlex
+import sys
 from contextlib import chdir
 from dataclasses import replace
 from pathlib import Path
@@ -64,7 +65,11 @@ def run(options: argparse.Namespace) -> int:
 def _list() -> int:
     from n2n.sweeps.store import STATES, SWEEPS, all_sweeps
 
-    sweeps = all_sweeps()
+    sweeps, damaged = all_sweeps()
+    for error in damaged:
+        print("n2n: error:", error, file=sys.stderr)
+    if not sweeps and damaged:
+        return 2
     if not sweeps:
         print(f"no sweeps in {SWEEPS.absolute()}; `n2n fit -m key=a,b` makes one")
         return 0
@@ -75,7 +80,7 @@ def _list() -> int:
         axes = " ".join(f"{key}={','.join(values)}" for key, values in sweep.axes.items())
         table.append([sweep.name, str(len(runs)), *(str(n or "") for n in counts), sweep.created[:16], axes])
     _print(table)
-    return 0
+    return 2 if damaged else 0
 
 
 def _status(sweep) -> int:

@@ -82,6 +82,20 @@ def start(launcher: str, settings: Sequence[str], folder: Path, count: int, work
         raise ConfigError(f"hydra/launcher={launcher}: {explain(error)}") from error
 
 
+def told_threads() -> int | None:
+    """Return how many threads the user wants per process; None where nothing is said.
+
+    OMP_NUM_THREADS may hold a number per level of nesting (`2,1`): the first is meant.
+
+    Raises:
+        ConfigError: It is no number.
+    """
+    told = os.environ.get("OMP_NUM_THREADS", "").partition(",")[0].strip()
+    if told and not told.isdecimal():
+        raise ConfigError(f"OMP_NUM_THREADS={told} is not a number; give one, or unset it")
+    return int(told or 0) or None
+
+
 class _Task:
     """What a launcher calls: with a composed configuration, which this work does not ask for."""
 

@@ -174,10 +174,15 @@ class Sweep:
         )
 
 
-def all_sweeps() -> list[Sweep]:
-    """Return the sweeps of this folder, oldest first."""
-    found = [Sweep.open(path.parent) for path in SWEEPS.glob(f"*/{_SWEEP}")]
-    return sorted(found, key=lambda sweep: sweep.created)
+def all_sweeps() -> tuple[list[Sweep], list[InputError]]:
+    """Return the sweeps of this folder, oldest first, and what is wrong with those that cannot be read."""
+    found, damaged = [], []
+    for path in sorted(SWEEPS.glob(f"*/{_SWEEP}")):
+        try:
+            found.append(Sweep.open(path.parent))
+        except InputError as error:
+            damaged.append(error)
+    return sorted(found, key=lambda sweep: sweep.created), damaged
 
 
 def as_dict(settings: list[str]) -> dict[str, str]:

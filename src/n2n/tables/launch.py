@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from n2n.sweeps.launchers import start
+from n2n.sweeps.launchers import start, told_threads
 from n2n.tables.plan import Job, Plan, cores
 from n2n.tables.run import run
 from n2n.tables.shared import now, open_jobs
@@ -36,8 +36,7 @@ class Worker:
     def __call__(self) -> None:
         """Measure until nothing is left that nobody is at."""
         os.chdir(self.home)
-        threads = int(os.environ.get("OMP_NUM_THREADS") or 0) or None
-        run(self.plan, Store(self.results), 1, self.again, _tell, self.since, threads)
+        run(self.plan, Store(self.results), 1, self.again, _tell, self.since, told_threads())
 
 
 def launch(

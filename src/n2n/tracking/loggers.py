@@ -1,5 +1,6 @@
 """Lightning's loggers as n2n uses them: opened before anything expensive, closed however the run ends."""
 
+import hashlib
 import re
 from importlib.util import find_spec
 from pathlib import Path
@@ -56,12 +57,16 @@ def close_logger(logger: Logger | None, failed: bool) -> None:
 
 
 def _labels(config: dict[str, Any], run_dir: Path, sweep: str | None) -> dict[str, Any]:
-    """Return what W&B sorts runs by. A resumed run goes on under the identity it had."""
+    """Return what W&B sorts runs by. A resumed run goes on under the identity it had.
+
+    The folder is a part of it: in a project that people share, the same run of another folder is another run.
+    """
     name = f"{sweep}-{run_dir.name}" if sweep else run_dir.name
+    place = hashlib.sha256(str(run_dir.absolute()).encode()).hexdigest()[:6]
     tags = [config["recipe"], config["datamodule"]["name"], config["task"]]
     return {
         "name": run_dir.name,
-        "id": _NOT_IN_ID.sub("-", name)[:128],
+        "id": f"{_NOT_IN_ID.sub('-', name)[:120]}-{place}",
         "group": sweep,
         "job_type": JOB_TYPE,
         "tags": [tag for tag in tags if tag],

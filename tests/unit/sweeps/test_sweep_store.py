@@ -79,7 +79,16 @@ def test_all_of_them_oldest_first():
         plan(name)
         path = store.SWEEPS / name / "sweep.json"
         path.write_text(path.read_text().replace('"created": "', f'"created": "{"9" if name == "a" else "1"}'))
-    assert [sweep.name for sweep in all_sweeps()] == ["b", "a"]
+    assert [sweep.name for sweep in all_sweeps()[0]] == ["b", "a"]
+
+
+def test_a_damaged_one_does_not_hide_the_others():
+    for name in ("a", "b"):
+        plan(name)
+    (store.SWEEPS / "a" / "sweep.json").write_text("{")
+    found, damaged = all_sweeps()
+    assert [sweep.name for sweep in found] == ["b"]
+    assert len(damaged) == 1 and "sweeps/a/sweep.json: is damaged" in str(damaged[0])
 
 
 def test_runs_are_those_planned_and_those_found():
