@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from n2n.cli.console import progress_bar, say
-from n2n.cli.outputs import make_folder
 from n2n.compose import compose
 from n2n.errors import InputError
 from n2n.formats import check_writable, read_cloud, write_cloud, write_mesh
+from n2n.formats.atomic import ELSEWHERE, make_folder
 from n2n.geometry.shapes import bracket
 from n2n.report.preview import draw_preview
 from n2n.tasks.api import fit_clouds
@@ -24,7 +24,7 @@ def run_demo(output: str) -> int:
     """Fit the bundled scan of a bracket; write mesh, denoised cloud and picture; print the error against the truth."""
     start = time.perf_counter()
     folder = Path(output)
-    make_folder(folder)
+    make_folder(folder, ELSEWHERE)
     check_writable(folder / "mesh.ply", (".ply",))
     cloud = read_cloud(sample_path())
     say(f"scan: {len(cloud):,} points of a mounting bracket, in mm, no normals ({sample_path()})")

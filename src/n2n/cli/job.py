@@ -15,9 +15,10 @@ from n2n.compose import config_hash
 from n2n.errors import ConfigError, OutputError
 from n2n.fitting.fit import LAST_CHECKPOINT, fit, pick_device
 from n2n.formats import atomic_path
+from n2n.formats.atomic import make_folder
 from n2n.registry import DATAMODULES
 from n2n.sweeps.claims import claim
-from n2n.sweeps.status import CLAIM, make_folder
+from n2n.sweeps.status import CLAIM
 from n2n.tasks.field import FIELD_FILE, Field
 from n2n.tracking.results import check_evaluations
 from n2n.tracking.tracker import track

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from n2n.errors import OutputError
 from n2n.formats import check_writable
+from n2n.formats.atomic import ELSEWHERE, make_folder
 
 
 def plan_outputs(output: str, paths: list[Path], extensions: tuple[str, ...], per_input: bool) -> list[Path]:
@@ -53,7 +54,7 @@ def check_preview(preview: Path, folder: Path) -> None:
 def new_folder(folder: Path) -> Iterator[None]:
     """Create a folder for the result written inside; take it away again, if it is new and empty, when that fails."""
     missing = [part for part in (folder, *folder.parents) if not part.exists()]
-    make_folder(folder)
+    make_folder(folder, ELSEWHERE)
     try:
         yield
     except BaseException:
@@ -61,15 +62,3 @@ def new_folder(folder: Path) -> Iterator[None]:
             for part in missing:
                 part.rmdir()
         raise
-
-
-def make_folder(folder: Path) -> None:
-    """Create a folder for results.
-
-    Raises:
-        OutputError: It cannot be created.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot be created ({error.strerror}); choose another folder with -o") from error

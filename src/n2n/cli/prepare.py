@@ -18,8 +18,9 @@ from n2n.datamodules.download import sha256
 from n2n.datamodules.layouts import Part, Scan, data_folder
 from n2n.datamodules.origin import is_made
 from n2n.datamodules.reading import read_scan
-from n2n.errors import ConfigError, InputError, OutputError
+from n2n.errors import ConfigError, InputError
 from n2n.formats import Cloud, atomic_path, write_cloud
+from n2n.formats.atomic import ELSEWHERE, make_folder
 from n2n.geometry.frame import Frame
 from n2n.geometry.noise import add_noise
 from n2n.geometry.poisson import poisson_disk, thin
@@ -145,7 +146,7 @@ def _record(
         "shapes": made,
         "earlier": sorted(earlier),
     }
-    _make(record)
+    make_folder(record.parent, ELSEWHERE)
     with atomic_path(record) as temporary:
         temporary.write_text(json.dumps(content, indent=1) + "\n")
 
@@ -175,13 +176,6 @@ def _deviation(text: str) -> float:
 
 def _copy(source: Path, target: Path) -> None:
     if not target.exists():
-        _make(target)
+        make_folder(target.parent, ELSEWHERE)
         with atomic_path(target) as temporary:
             shutil.copyfile(source, temporary)
-
-
-def _make(path: Path) -> None:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{path.parent}: cannot be made ({error.strerror}); choose another folder with -o") from error

@@ -20,7 +20,7 @@ from n2n.architectures.base import SDF
 from n2n.compose import config_hash
 from n2n.config import AUTO
 from n2n.datamodules.observations import ObservationsDataModule
-from n2n.errors import ConfigError, OutputError
+from n2n.errors import ConfigError
 from n2n.fitting.assemble import build_field, build_objective, build_optimizer
 from n2n.fitting.callbacks import ProgressReport, Report
 from n2n.fitting.checkpoint import AtomicCheckpointIO, read_state
@@ -29,6 +29,7 @@ from n2n.fitting.objective import Objective
 from n2n.fitting.prepare import fill_config, prepare
 from n2n.fitting.redistance import redistance
 from n2n.fitting.revision import Revision
+from n2n.formats.atomic import make_folder
 from n2n.geometry.frame import Frame
 
 LAST_CHECKPOINT = "last.ckpt"
@@ -112,10 +113,7 @@ def fit(
     resume = _resume_from(run_dir)
     first = _iteration_of(resume, identity) if resume else 0
     if run_dir:
-        try:
-            run_dir.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise OutputError(f"{run_dir}: cannot make this folder ({error.strerror}); choose another one") from error
+        make_folder(run_dir)
     data.configure_draws(config["pairs"], config["batch_size"], seed, first, plan_reuse)
     callbacks = [revision, *callbacks, *([ProgressReport(report)] if report else [])]
     if run_dir:

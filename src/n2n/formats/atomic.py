@@ -9,6 +9,8 @@ from pathlib import Path
 from n2n.errors import OutputError
 from n2n.registry import suggest
 
+ELSEWHERE = "choose another folder with -o"
+
 
 @contextmanager
 def atomic_path(path: str | Path) -> Iterator[Path]:
@@ -21,7 +23,7 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
     try:
         handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
     except OSError as error:
-        raise OutputError(f"{path}: cannot write there ({error.strerror}); choose another folder with -o") from error
+        raise OutputError(f"{path}: cannot write there ({error.strerror}); {ELSEWHERE}") from error
     os.close(handle)
     temporary = Path(name)
     try:
@@ -35,6 +37,23 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         raise OutputError(f"{path}: writing failed ({error.strerror or error}); nothing was left there") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def make_folder(folder: Path, advice: str = "choose another one") -> Path:
+    """Make a folder, and those it lies in, unless it is there; return it.
+
+    Args:
+        folder: The folder.
+        advice: What to do where that cannot be, for the message.
+
+    Raises:
+        OutputError: It cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot make this folder ({error.strerror}); {advice}") from error
+    return folder
 
 
 def check_writable(path: str | Path, extensions: Iterable[str], new_folder: bool = False) -> None:
@@ -62,13 +81,13 @@ def check_writable(path: str | Path, extensions: Iterable[str], new_folder: bool
         if new_folder:
             folder = next(parent for parent in (folder, *folder.absolute().parents) if parent.exists())
             if not folder.is_dir():
-                raise OutputError(f"{path}: {folder} is a file, not a folder; choose another folder with -o")
+                raise OutputError(f"{path}: {folder} is a file, not a folder; {ELSEWHERE}")
         elif not folder.is_dir():
             raise OutputError(f"{path}: the folder {folder} does not exist; create it first")
         with tempfile.TemporaryFile(dir=folder):
             pass
         is_locked = path.exists() and not os.access(path, os.W_OK)
     except OSError as error:
-        raise OutputError(f"{path}: cannot write there ({error.strerror}); choose another folder with -o") from error
+        raise OutputError(f"{path}: cannot write there ({error.strerror}); {ELSEWHERE}") from error
     if is_locked:
         raise OutputError(f"{path}: exists and is read-only; choose another name")

@@ -10,9 +10,10 @@ from datetime import datetime
 from pathlib import Path
 
 from n2n.errors import N2NError
+from n2n.formats.atomic import make_folder
 from n2n.messages import unexpected
 from n2n.sweeps.claims import claim
-from n2n.sweeps.status import CLAIM, FIELD_FILE, Status, make_folder, read_status
+from n2n.sweeps.status import CLAIM, FIELD_FILE, Status, read_status
 
 TAKEN = "taken"
 

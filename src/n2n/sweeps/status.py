@@ -7,8 +7,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from n2n.errors import OutputError
-from n2n.formats.atomic import atomic_path
+from n2n.formats.atomic import atomic_path, make_folder
 from n2n.sweeps.claims import STALE_AFTER, is_held
 
 FIELD_FILE = "field.ckpt"  # that of n2n.tasks.field, which imports torch
@@ -59,18 +58,6 @@ def write_json(path: Path, content: Any) -> None:
     make_folder(path.parent)
     with atomic_path(path) as temporary:
         temporary.write_text(json.dumps(content, indent=1) + "\n")
-
-
-def make_folder(folder: Path) -> None:
-    """Make a folder unless it is there.
-
-    Raises:
-        OutputError: It cannot be made.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot make this folder ({error.strerror}); work in another one") from error
 
 
 def run_state(folder: Path, told: str | None) -> str:

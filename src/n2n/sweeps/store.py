@@ -10,9 +10,10 @@ from datetime import datetime
 from pathlib import Path
 
 from n2n.errors import ConfigError, InputError
+from n2n.formats.atomic import make_folder
 from n2n.registry import suggest
 from n2n.sweeps.claims import claim, heartbeat_age
-from n2n.sweeps.status import CLAIM, make_folder, read_json, read_status, run_state, write_json
+from n2n.sweeps.status import CLAIM, read_json, read_status, run_state, write_json
 
 SWEEPS = Path("sweeps")
 STATES = ("done", "running", "stale", "failed", "pending")

@@ -6,6 +6,7 @@ from pathlib import Path
 from types import TracebackType
 
 from n2n.errors import OutputError
+from n2n.formats.atomic import make_folder
 from n2n.sweeps.claims import claim, is_held
 from n2n.tables.plan import Job, Plan
 from n2n.tables.spec import Fit
@@ -99,9 +100,4 @@ def _claim(store: Store, fit: Fit) -> Path:
 
 
 def _claims(store: Store) -> Path:
-    folder = store.folder / _CLAIMS
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot make this folder ({error.strerror}); choose another --results") from error
-    return folder
+    return make_folder(store.folder / _CLAIMS, "choose another --results")

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from n2n.compose import conf_dir, config_hash
-from n2n.errors import OutputError
 from n2n.evaluation.options import load_option
 from n2n.formats import atomic_path
+from n2n.formats.atomic import make_folder
 from n2n.tables.spec import Fit
 
 # What decides a number. Data is known by its content, which the hash of the configuration holds; tables, pictures and
@@ -64,10 +64,7 @@ class Store:
             OutputError: The folder cannot be written.
         """
         path = self.path(fit)
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise OutputError(f"{path.parent}: cannot make this folder ({error.strerror})") from error
+        make_folder(path.parent, "choose another --results")
         with atomic_path(path) as temporary:
             temporary.write_text(json.dumps(record, indent=1, default=float) + "\n", encoding="utf-8")
 

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from n2n.errors import OutputError
 from n2n.formats import atomic_path
+from n2n.formats.atomic import make_folder
 from n2n.tables.fill import fill
 from n2n.tables.plan import Plan
 from n2n.tables.render import Rendered, render
@@ -12,10 +12,7 @@ from n2n.tables.store import Store
 
 def write_tables(plan: Plan, store: Store, out: Path) -> dict[str, Rendered]:
     """Write `<table>.md`, `.tex` and `.csv` for each table asked for, and `index.md`; return them by name."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{out}: cannot make this folder ({error.strerror}); give another one with --out") from error
+    make_folder(out, "give another one with --out")
     made = {}
     for table in plan.tables:
         grid, paper = fill(table, plan, store)
