@@ -50,10 +50,8 @@ def render(result: dict[str, Any]) -> str:
         "threads": "one after the other, all cores each",
         "parallel": f"{result['cores']} processes, one core each",
     }
-    rows = [
-        [name, *(span(result["ways"][way][what], " s") for what in ("seconds", "processor", "fit", "beside", "start"))]
-        for way, name in names.items()
-    ]
+    told = ("seconds", "processor", "fit", "beside", "start")
+    rows = [[name, *(span(result["ways"][way][what], " s") for what in told)] for way, name in names.items()]
     gain, beside = result["throughput"]["serial"], result["ways"]["parallel"]["beside"]["median"]
     load = span(result["ways"]["parallel"]["load"])
     return "\n".join(
