@@ -56,8 +56,8 @@ def render(result: dict[str, Any]) -> str:
     load = span(result["ways"]["parallel"]["load"])
     return "\n".join(
         [
-            f"{result['runs']} runs of `{' '.join(['n2n fit -m', *result['settings']])}` that differ in their seed, with "
-            "`hydra/launcher=serial` and with the default, `joblib`. The whole command counts; a fit is what "
+            f"{result['runs']} runs of `{' '.join(['n2n fit -m', *result['settings']])}` that differ in their seed, "
+            "with `hydra/launcher=serial` and with the default, `joblib`. The whole command counts; a fit is what "
             "`summary.json` calls its seconds.",
             "",
             table(
