@@ -23,7 +23,7 @@ _WAYS = {"serial": ("serial", "1"), "threads": ("serial", None), "parallel": ("j
 _THROUGHPUT, _OVERHEAD = 1.7, 3.0  # what is to be reached: times the serial throughput; seconds a run
 
 
-def run(runs: int = 24, rounds: int = 3, settings: Sequence[str] = ()) -> dict[str, Any]:
+def run(runs: int = 24, rounds: int = 1, settings: Sequence[str] = ()) -> dict[str, Any]:
     """Measure.
 
     Args:

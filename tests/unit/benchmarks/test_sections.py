@@ -24,7 +24,7 @@ CHILDREN = {
 MAY_BE_ZERO = {"disagreement", "extra", "largest", "ratio_of_blocks", "room", "pictures", "scenes"}
 
 
-def done_sweep(folder, arguments):
+def done_sweep(folder, arguments, threads):
     """Leave what a sweep of two runs leaves, without fitting."""
     measure([sys.executable, "-S", "-c", "sum(range(3_000_000))"])
     planned = {"a": ["seed=0"], "b": ["seed=1"]}
