@@ -43,6 +43,7 @@ def run_multirun(
     if grid.jobs is None:
         check_jobs(settings, flags)
     check_installed(grid.master.hydra)
+    told_threads()
     sweep = _same(resumed, grid) if resumed else _plan(name, settings, flags, grid)
     jobs = None if grid.jobs is None else _wanted(sweep, grid.jobs, states)
     if jobs == []:

@@ -100,7 +100,7 @@ class Chosen:
         }
 
     def revised(self, residual: float, assumed: float) -> float:
-        """Return the noise behind what a fitted field leaves over: at most what patches saw, who can only see too much.
+        """Return the noise behind what a fitted field leaves over: at most what patches saw, who rarely see too little.
 
         Args:
             residual: Root mean square distance of the points from the zero set; NaN for unknown.

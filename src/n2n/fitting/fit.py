@@ -143,7 +143,8 @@ def fit(
         else:
             state = read_state(resume)
             module.load_state_dict(state["state_dict"])
-            revision.load_state_dict(state["callbacks"][revision.state_key])
+            if found := state["callbacks"].get(revision.state_key):
+                revision.load_state_dict(found)
     shapes, config = revision.shapes, revision.config
     losses = {"loss", "distance", *objective.terms} - set(watched or ())
     field = module.result.eval().to(device)

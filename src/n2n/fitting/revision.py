@@ -14,6 +14,7 @@ from n2n.fitting.prepare import Shape
 from n2n.geometry.residual import residual_noise
 
 _BEGIN = 0.7  # of the measured noise: a field that is too smooth takes thin parts for noise, and goes on doing so
+_SPARSE = 3.0  # noise deviations between points; beyond that a field follows single points, and knows no better
 _WHEN = (0.25, 0.4)  # of the fit; sooner it has not settled, later it could not follow any more
 _ROOM = 2.0  # noise deviations
 _PROBES = 16_384
@@ -21,6 +22,9 @@ _PROBES = 16_384
 
 class Revision(L.Callback):
     """Begin with less noise than patches saw, ask the field twice how noisy the points are, and go on with its answer.
+
+    Sparse points are not asked about. Of many observations the fit begins with all of the noise: their cells are so
+    fine that a field which is too rough at first perforates thin walls. Nothing is asked if no setting depends on it.
 
     Args:
         shapes: As measured.
@@ -39,11 +43,19 @@ class Revision(L.Callback):
         build: Callable[[dict[str, Any]], Objective],
     ) -> None:
         self._measured, self._fill, self._build = shapes, fill, build
-        self._asked = 0
-        self._go_on_with([_BEGIN * shape.chosen.noise for shape in shapes])
+        self._resumed = False
+        measured = [shape.chosen.noise for shape in shapes]
+        self._go_on_with(measured)
+        less = [_BEGIN * shape.chosen.noise if _is_dense(shape) else shape.chosen.noise for shape in shapes]
+        matters = fill(_with_noise(shapes, less)) != self.config
+        asks = matters and self.config["iterations"] > self.config["plan_reuse"]
+        self._asked = 0 if asks else len(_WHEN)
+        if asks:
+            is_single = [shape.chosen.observations == 1 for shape in shapes]
+            self._go_on_with([a if one else b for a, b, one in zip(less, measured, is_single, strict=True)])
 
     def on_train_start(self, trainer: Any, pl_module: Any) -> None:
-        if self._asked:  # in the part of the fit that a checkpoint holds
+        if self._resumed:
             pl_module.objective = self._build(self.config)
 
     def on_train_batch_start(self, trainer: Any, pl_module: Any, *unused: Any) -> None:
@@ -56,21 +68,23 @@ class Revision(L.Callback):
                 pl_module.objective = self._build(self.config)
 
     def state_dict(self) -> dict[str, Any]:
-        return {"asked": self._asked, "noise": [shape.chosen.noise for shape in self.shapes]}
+        return {"asked": self._asked, "noise": self._noise()}
 
     def load_state_dict(self, state_dict: dict[str, Any]) -> None:
-        self._asked = state_dict["asked"]
+        self._asked, self._resumed = state_dict["asked"], True
         self._go_on_with(state_dict["noise"])
 
+    def _noise(self) -> list[float]:
+        return [shape.chosen.noise for shape in self.shapes]
+
     def _go_on_with(self, noise: list[float]) -> None:
-        self.shapes = [
-            replace(shape, chosen=replace(shape.chosen, noise=value))
-            for shape, value in zip(self._measured, noise, strict=True)
-        ]
+        self.shapes = _with_noise(self._measured, noise)
         self.config = self._fill(self.shapes)
 
     @torch.no_grad()
     def _ask(self, field: SDF, condition: int) -> float:
+        if not _is_dense(self._measured[condition]):
+            return self._measured[condition].chosen.noise
         sample, noise = self.shapes[condition].sample, self.shapes[condition].chosen.noise
         device = next(field.parameters()).device
         points = torch.as_tensor(sample[:: math.ceil(len(sample) / _PROBES)], dtype=torch.float32, device=device)
@@ -78,3 +92,13 @@ class Revision(L.Callback):
         with field.shared():
             residual = residual_noise(lambda x: field.value_and_gradient(x, codes), points, _ROOM * noise)
         return self._measured[condition].chosen.revised(residual, noise)
+
+
+def _is_dense(shape: Shape) -> bool:
+    return shape.chosen.spacing < _SPARSE * shape.chosen.noise
+
+
+def _with_noise(shapes: list[Shape], noise: list[float]) -> list[Shape]:
+    return [
+        replace(shape, chosen=replace(shape.chosen, noise=value)) for shape, value in zip(shapes, noise, strict=True)
+    ]

@@ -234,15 +234,17 @@ def winding_number(
 
     Source: Barill et al. 2018, Fast Winding Numbers for Soups and Clouds, Eq. 3 (summed directly).
     """
-    p, n, a = (torch.as_tensor(x, dtype=torch.float32) for x in (points, normals, areas))
+    centre = points.mean(axis=0)
+    p, n, a = (torch.as_tensor(x, dtype=torch.float32) for x in (points - centre, normals, areas))
     # |q - p|^2 + area / 4 and the flux area (p - q) . n / 4 pi are both linear in (q, 1), up to |q|^2.
     squared = torch.cat([-2 * p, (p.square().sum(1) + 0.25 * a)[:, None]], 1).T.contiguous()
     flux = torch.cat([-n, (p * n).sum(1)[:, None]], 1).T * (a / (4 * np.pi))
+    nearest = (0.25 * a).clamp_min(_TINY)  # rounding errors of the squares may be larger
     result = np.empty(len(queries))
     for start in range(0, len(queries), _ROWS):
-        q = torch.as_tensor(queries[start : start + _ROWS], dtype=torch.float32)
+        q = torch.as_tensor(queries[start : start + _ROWS] - centre, dtype=torch.float32)
         ahead = torch.cat([q, torch.ones((len(q), 1))], 1)
-        inverse = torch.addmm(q.square().sum(1)[:, None], ahead, squared).clamp_min_(_TINY).rsqrt_()
+        inverse = torch.addmm(q.square().sum(1)[:, None], ahead, squared).clamp_min_(nearest).rsqrt_()
         term = (ahead @ flux).mul_(inverse).mul_(inverse).mul_(inverse)
         result[start : start + _ROWS] = term.sum(1).numpy()
     return result

@@ -95,7 +95,8 @@ def make_grid(settings: Sequence[str], flags: Sequence[str], folder: Path) -> Gr
         jobs = None
         if master.hydra.sweeper._target_ == _BASIC:
             expanded = BasicSweeper.split_arguments(given, None)[0]
-            check_choices(dict.fromkeys(chain(*expanded)), hydra.config_loader)
+            if not any(text.startswith("hydra.searchpath=") for text in settings):
+                check_choices(dict.fromkeys(chain(*expanded)), hydra.config_loader)
             jobs = _unique([_job(hydra.config_loader, master, one, axes) for one in expanded])
     except ConfigError:
         raise

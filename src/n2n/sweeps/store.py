@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 
-from n2n.errors import ConfigError, InputError
+from n2n.errors import ConfigError, InputError, N2NError
 from n2n.formats.atomic import make_folder
 from n2n.registry import suggest
 from n2n.sweeps.claims import claim, heartbeat_age
@@ -175,13 +175,13 @@ class Sweep:
         )
 
 
-def all_sweeps() -> tuple[list[Sweep], list[InputError]]:
+def all_sweeps() -> tuple[list[Sweep], list[N2NError]]:
     """Return the sweeps of this folder, oldest first, and what is wrong with those that cannot be read."""
     found, damaged = [], []
     for path in sorted(SWEEPS.glob(f"*/{_SWEEP}")):
         try:
             found.append(Sweep.open(path.parent))
-        except InputError as error:
+        except N2NError as error:
             damaged.append(error)
     return sorted(found, key=lambda sweep: sweep.created), damaged
 

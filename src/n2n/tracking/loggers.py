@@ -62,7 +62,7 @@ def _labels(config: dict[str, Any], run_dir: Path, sweep: str | None) -> dict[st
     The folder is a part of it: in a project that people share, the same run of another folder is another run.
     """
     name = f"{sweep}-{run_dir.name}" if sweep else run_dir.name
-    place = hashlib.sha256(str(run_dir.absolute()).encode()).hexdigest()[:6]
+    place = hashlib.sha256(str(run_dir.resolve()).encode()).hexdigest()[:6]
     tags = [config["recipe"], config["datamodule"]["name"], config["task"]]
     return {
         "name": run_dir.name,

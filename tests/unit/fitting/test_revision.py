@@ -1,5 +1,6 @@
 """The noise, measured anew by the field while it is fitted."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -30,7 +31,7 @@ def _shape(measured, seed=0):
     cloud = 0.5 * directions / np.linalg.norm(directions, axis=1, keepdims=True) + NOISE * random.standard_normal(
         (30_000, 3)
     )
-    scales = Scales(measured, np.sqrt(np.pi / len(cloud)), 96, np.pi)
+    scales = Scales(measured, float(np.sqrt(np.pi / len(cloud))), 96, np.pi)
     return Shape([], scales, choose(scales, [cloud]), cloud, None)
 
 
@@ -42,7 +43,7 @@ def _revision(*measured):
         return f"objective {len(built)}"
 
     def fill(shapes):
-        return {"noise": [shape.chosen.noise for shape in shapes]}
+        return {"noise": [shape.chosen.noise for shape in shapes], "iterations": 100, "plan_reuse": 5}
 
     return Revision([_shape(noise) for noise in measured], fill, build), built
 
@@ -86,7 +87,8 @@ def test_every_shape_has_its_own():
 
 def test_where_nothing_depends_on_the_noise_the_objective_stays():
     shape = _shape(1.3 * NOISE)
-    revision = Revision([shape], lambda shapes: {"iterations": 100}, lambda config: pytest.fail("built anew"))
+    config = {"iterations": 100, "plan_reuse": 5}
+    revision = Revision([shape], lambda shapes: config, lambda config: pytest.fail("built anew"))
     assert _run(revision)[-1] == "first"
 
 
@@ -97,6 +99,37 @@ def test_a_resumed_fit_goes_on_with_what_was_found():
     resumed.load_state_dict(revision.state_dict())
     assert resumed.config == revision.config
     assert _run(resumed)[0] == "objective 1" and built == [revision.config["noise"]]
+
+
+def _untouched(shape, plan_reuse=5):
+    def fill(shapes):
+        return {"noise": [shape.chosen.noise for shape in shapes], "iterations": 100, "plan_reuse": plan_reuse}
+
+    revision = Revision([shape], fill, lambda config: pytest.fail("built anew"))
+    _run(revision)
+    return revision.config["noise"] == [shape.chosen.noise]
+
+
+def test_sparse_points_are_not_asked_about():
+    shape = _shape(1.3 * NOISE)
+    assert _untouched(replace(shape, chosen=replace(shape.chosen, spacing=4 * shape.chosen.noise)))
+
+
+def test_a_fit_of_one_matching_has_no_time_to_ask():
+    assert _untouched(_shape(1.3 * NOISE), plan_reuse=100)
+
+
+def test_many_observations_begin_with_all_of_the_noise():
+    shape = _shape(1.3 * NOISE)
+    many = replace(shape, chosen=replace(shape.chosen, observations=9))
+
+    def fill(shapes):
+        return {"noise": shapes[0].chosen.noise, "iterations": 100, "plan_reuse": 5}
+
+    revision = Revision([many], fill, lambda config: "new")
+    assert revision.config["noise"] == many.chosen.noise
+    _run(revision)
+    assert revision.config["noise"] == pytest.approx(NOISE, rel=0.06)
 
 
 def test_a_clean_cloud_keeps_its_length():

@@ -47,8 +47,8 @@ def watch(
 ) -> list[Moment]:
     """Fit one cloud and look at it in between.
 
-    The steps are those of `n2n.fit`, without the average of weights at its end. A query is matched to what the drawn
-    query nearest to it, after the pull, is matched to.
+    The steps are those of `n2n.fit`, without the average of weights at its end, and with the noise that patches see. A
+    query is matched to what the drawn query nearest to it, after the pull, is matched to.
 
     Args:
         points: (n, 3) world coordinates.
