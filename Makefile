@@ -35,7 +35,7 @@ format: $(STAMP)  ## rewrite the sources in house style
 	@$(BIN)/ruff check --fix .
 	@$(BIN)/ruff format .
 
-bench: $(STAMP)  ## measure everything, about 15 minutes; BENCH="matching step" only these, BENCH=--help tells more
+bench: $(STAMP)  ## measure everything, about 25 minutes; BENCH="matching step" only these, BENCH=--help tells more
 	@$(BIN)/python -m benchmarks $(BENCH)
 
 bench-docs: $(STAMP)  ## copy the report of `make bench` to docs/benchmarks.md
