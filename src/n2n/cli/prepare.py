@@ -80,7 +80,7 @@ def prepare(name: str, output: str | None, points: Sequence[int], noise: Sequenc
             # Recorded first: what an interrupted run leaves must not pass for the benchmark's own.
             _record(name, record, points, noise, seed, made)
             for path, cloud in clouds.items():
-                make_folder(target / path.parent, ELSEWHERE)
+                make_folder((target / path).parent, ELSEWHERE)
                 write_cloud(target / path, Cloud(cloud))
             if scan.name in meshes and target != root:
                 # P2M is measured against the mesh in the same tree.
