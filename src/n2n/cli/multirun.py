@@ -43,12 +43,12 @@ def run_multirun(
     if grid.jobs is None:
         check_jobs(settings, flags)
     check_installed(grid.master.hydra)
-    told_threads()
+    threads = told_threads()
     sweep = _same(resumed, grid) if resumed else _plan(name, settings, flags, grid)
     jobs = None if grid.jobs is None else _wanted(sweep, grid.jobs, states)
     if jobs == []:
         return _report(grid, sweep)
-    task = _task(grid, sweep, len(jobs) if jobs else None)
+    task = _task(grid, sweep, len(jobs) if jobs else None, threads)
     try:
         with watching(Watch(sweep, [job.hash for job in jobs] if jobs else None)):
             if jobs:
@@ -96,14 +96,14 @@ def _wanted(sweep: Sweep, jobs: list[Job], states: Sequence[str]) -> list[Job]:
     return wanted
 
 
-def _task(grid: Grid, sweep: Sweep, runs: int | None) -> SweepJob:
+def _task(grid: Grid, sweep: Sweep, runs: int | None, told: int | None) -> SweepJob:
     """Return what workers are to do, each with its share of this machine."""
     threads, parent = None, None
     if is_joblib(grid):
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
         processes, share = set_processes(grid, cores, runs or cores)
         # Whoever says how many threads is obeyed.
-        threads, parent = told_threads() or share, os.getpid()
+        threads, parent = told or share, os.getpid()
         say(f"sweep: {processes} at a time, threads of each: {threads}")
     planned = None if grid.jobs is None else {" ".join(job.settings): job.hash for job in grid.jobs}
     return SweepJob(sweep.folder.absolute(), tuple(grid.axes), planned, threads, parent)

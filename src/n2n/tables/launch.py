@@ -62,7 +62,7 @@ def launch(
     if not jobs:
         return []
     since, workers = now(store), min(workers, len(jobs))
-    told_threads()
+    told_threads()  # what is wrong with it is said here, not by every worker
     if launcher in _ON_THIS_MACHINE:
         os.environ.setdefault("OMP_NUM_THREADS", str(max(1, cores() // workers)))
     worker = Worker(plan, store.folder.absolute(), again, since, Path.cwd())
