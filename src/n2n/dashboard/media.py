@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 PICTURE, MESH, POINTS = "level_sets.png", "mesh.glb", "points.npz"
-_PICTURE_SIDE = 900  # pixels
-_QUALITY, _EFFORT = 70, 1  # of WebP; more effort would take longer than all the rest of the page
+_PICTURE_SIDE = 720  # pixels
+_QUALITY, _EFFORT = 60, 1  # of WebP; more effort would take longer than all the rest of the page
 _VERTICES = 8_000
 _POINTS = 5_000
 _STEPS = 65_535  # of a coordinate across the scene's box

@@ -23,6 +23,7 @@ FOLDER = "media"
 _RESOLUTION = 96  # voxels along the longest side
 _POINTS = 20_000
 _SIZE = 360  # pixels
+_COLOURS = 256  # of the picture: a page holds hundreds
 
 
 @dataclass
@@ -64,7 +65,7 @@ def draw_media(field: Field, data: Any, run_dir: Path) -> Media:
     noisy, reference = noisy_points(data), getattr(data, "reference", None)
     truth = (reference.vertices, reference.faces) if reference else (None, None)
     subject = Subject(run_dir.name, "units of the data", noisy, *truth, up=up_axis(noisy))
-    save(folder / "level_sets.png", level_sets(field, subject, mesh, _SIZE))
+    save(folder / "level_sets.png", level_sets(field, subject, mesh, _SIZE), _COLOURS)
 
     some = np.random.default_rng(0).permutation(len(noisy))[:_POINTS]
     points = field.denoise(noisy[np.sort(some)])
