@@ -15,6 +15,7 @@ import pytest
 
 from n2n.cli.main import main
 from n2n.cli.multirun import _report
+from n2n.errors import ConfigError
 from n2n.sweeps.grid import Grid
 from n2n.sweeps.status import Status
 from n2n.sweeps.store import Sweep
@@ -114,6 +115,23 @@ def test_a_sweep_is_resumed_with_its_own_settings(capsys):
     assert main(["sweep", "results", "x", "hydra/launcher=basic"]) == 2
     assert "takes no settings" in capsys.readouterr().err
     assert main(["sweep", "status", "x", "-o", "x.csv"]) == 2
+
+
+def test_a_command_that_means_other_runs_now_keeps_no_other_from_its_own(capsys, monkeypatch):
+    Sweep.plan("x", ["-m", "sweep=x", "seed=0,1"], {"seed": ["0", "1"]}, {"gone": ["seed=0"]})
+    Sweep.plan("x", ["-m", "sweep=x", "seed=2,3"], {"seed": ["2", "3"]}, {"here": ["seed=2"]})
+    given = []
+
+    def fit(settings, flags, states, sweep):
+        given.append(settings[0])
+        if settings[0] == "seed=0,1":
+            raise ConfigError("it means other runs")
+        return 0
+
+    monkeypatch.setattr("n2n.cli.multirun.run_multirun", fit)
+    assert main(["sweep", "resume", "x"]) == 2
+    assert sorted(given) == ["seed=0,1", "seed=2,3"]
+    assert "it means other runs" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("jobs", "verb"), [([], "retry"), (None, "results")])

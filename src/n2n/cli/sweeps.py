@@ -128,7 +128,7 @@ def _resume(sweep, settings: list[str], states: tuple[str, ...]) -> int:
             f"{other[0]} would make other runs; a sweep is resumed with its own settings, only the launcher may change "
             "(hydra/launcher=..., hydra.launcher.key=...)"
         )
-    codes = []
+    codes, refused = [], []
     # Paths in the command are those of the folder it was given in.
     folder = sweep.folder.absolute()
     home = folder.parent.parent
@@ -139,7 +139,13 @@ def _resume(sweep, settings: list[str], states: tuple[str, ...]) -> int:
             if any(text.startswith("hydra/launcher=") for text in settings):
                 kept = [text for text in kept if not is_about_launcher(text)]
             wanted = [*take_name(kept)[1], *settings, f"sweep={sweep.name}"]
-            codes.append(run_multirun(wanted, flags, states, sweep))
+            try:
+                codes.append(run_multirun(wanted, flags, states, sweep))
+            except ConfigError as error:
+                # One whose defaults have changed since keeps no other from its runs.
+                refused.append(str(error))
+    if refused:
+        raise ConfigError("\n".join(refused))
     return codes[-1]
 
 

@@ -71,8 +71,16 @@ function empty(text) {
   return h("p", { class: "empty" }, text);
 }
 
+function hint(text) {
+  return h("p", { class: "hint" }, text);
+}
+
 function panelBox(title, ...children) {
   return h("section", { class: "panel" }, h("h3", {}, title), ...children);
+}
+
+function widePanel(title, ...children) {
+  return h("section", { class: "panel wide" }, h("h3", {}, title), ...children);
 }
 
 // Nearest of a sorted list.

@@ -4,7 +4,7 @@ const PICTURES_AT_FIRST = 12;
 
 function scenePanel(panel) {
   const parts = [leftOutNote(), viewChooser(), gallery()].filter(Boolean);
-  return h("section", { class: "panel wide" }, h("h3", {}, panel.title), parts.length ? parts : empty(panel.empty));
+  return widePanel(panel.title, parts.length ? parts : empty(panel.empty));
 }
 
 function leftOutNote() {

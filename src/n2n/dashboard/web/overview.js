@@ -59,7 +59,7 @@ function median(values) {
 }
 
 function versusPanel(panel) {
-  if (!data.versus.length) return h("section", { class: "panel wide" }, h("h3", {}, panel.title), empty(panel.empty));
+  if (!data.versus.length) return widePanel(panel.title, empty(panel.empty));
   const columns = [
     {
       name: "paper's table",
@@ -89,13 +89,9 @@ function versusPanel(panel) {
   const notes = [...new Set(data.versus.flatMap((entry) => entry.notes))];
   const table = sortable(columns, "Means over shapes, ours and the paper's");
   subscribe(() => table.set(data.versus.flatMap(versusRows)));
-  return h(
-    "section",
-    { class: "panel wide" },
-    h("h3", {}, panel.title),
-    h(
-      "p",
-      { class: "hint" },
+  return widePanel(
+    panel.title,
+    hint(
       "Ours is the mean over the shapes that are here, repetitions of a shape counted once; the paper's is over its dataset.",
     ),
     table.node,

@@ -8,7 +8,7 @@ function parallelPanel(panel) {
   );
   const axes = [...varied(), ...results];
   if (!varied().length || axes.length < 2)
-    return h("section", { class: "panel wide" }, h("h3", {}, panel.title), empty(panel.empty));
+    return widePanel(panel.title, empty(panel.empty));
   const scroller = h("div", {
     class: "scroller",
     tabindex: 0,
@@ -154,13 +154,9 @@ function parallelPanel(panel) {
   // Another height of the axes would move what was brushed.
   const redraw = whenSized(scroller, draw);
   subscribe(colour);
-  return h(
-    "section",
-    { class: "panel wide" },
-    h("h3", {}, panel.title),
-    h(
-      "p",
-      { class: "hint" },
+  return widePanel(
+    panel.title,
+    hint(
       "Drag along an axis to keep only the runs in that range, everywhere on this page; click the axis to let go. With the keyboard: the filter above, e.g. seed<3. ",
     ),
     clear,

@@ -56,10 +56,8 @@ function runPage(address) {
       { class: "panels" },
       mediaPanel(run),
       evaluationPanel(run),
-      h(
-        "section",
-        { class: "panel" },
-        h("h3", {}, "Results"),
+      panelBox(
+        "Results",
         results.length
           ? h(
               "div",
@@ -102,10 +100,8 @@ function evaluationPanel(run) {
     showNumber(run.values[name]),
     ...floors.map((floor) => h("span", { class: "floor" }, showNumber(floorValue(run, name, floor)))),
   ]);
-  return h(
-    "section",
-    { class: "panel wide" },
-    h("h3", {}, "Evaluation"),
+  return widePanel(
+    "Evaluation",
     rows.length
       ? plainTable(["raw values", "this run", ...floors.map((floor) => FLOORS[floor])], rows, "Evaluation")
       : empty("not evaluated; 'evaluate=[denoise/sbp]' does it where the true surface is known"),
@@ -118,10 +114,8 @@ function mediaPanel(run) {
     run.scene ? sceneView(run) : null,
     run.picture ? h("img", { class: "picture", src: run.picture, alt: "level sets of the field" }) : null,
   ].filter(Boolean);
-  return h(
-    "section",
-    { class: "panel wide" },
-    h("h3", {}, "Surface and cloud"),
+  return widePanel(
+    "Surface and cloud",
     pictures.length
       ? pictures
       : empty(
@@ -145,10 +139,8 @@ function settingsPanel(run) {
   const own = Object.keys(run.effective)
     .filter((key) => !(key in run.config))
     .map((key) => [key, `→ ${showSetting(run.effective[key])}`]);
-  return h(
-    "section",
-    { class: "panel" },
-    h("h3", {}, "Settings"),
+  return panelBox(
+    "Settings",
     keys.length
       ? h("div", { class: "tall" }, plainTable([], [...rows, ...own], "Settings; → what auto became"))
       : empty("config.yaml is missing"),

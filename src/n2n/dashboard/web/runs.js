@@ -9,7 +9,7 @@ function stateBadge(run) {
 }
 
 function runsPanel(panel) {
-  if (!runs.length) return h("section", { class: "panel wide" }, h("h3", {}, panel.title), empty(panel.empty));
+  if (!runs.length) return widePanel(panel.title, empty(panel.empty));
   const several = new Set(runs.map((run) => run.sweep)).size > 1;
   const columns = [
     {

@@ -165,7 +165,7 @@ function explorePanel(panel) {
     ),
   );
   subscribe(redraw);
-  return h("section", { class: "panel wide" }, h("h3", {}, title), choices, box);
+  return widePanel(title, choices, box);
 }
 
 function legendList(entries) {

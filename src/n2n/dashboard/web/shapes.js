@@ -9,7 +9,7 @@ const FLOORS = {
 
 function shapesPanel(panel) {
   const metrics = evaluated(panel.metrics);
-  if (!metrics.length) return h("section", { class: "panel wide" }, h("h3", {}, panel.title), empty(panel.empty));
+  if (!metrics.length) return widePanel(panel.title, empty(panel.empty));
   const columns = [
     { name: "data", of: (row) => row.data, show: (row) => row.data },
     { name: "shape", of: (row) => row.shape, show: (row) => row.shape },
@@ -66,13 +66,9 @@ function shapesPanel(panel) {
       ),
     );
   });
-  return h(
-    "section",
-    { class: "panel wide" },
-    h("h3", {}, panel.title),
-    h(
-      "p",
-      { class: "hint" },
+  return widePanel(
+    panel.title,
+    hint(
       `CD and P2M × 10${superscript(Math.round(Math.log10(panel.scale)))}; other results as they are. Repetitions are averaged.`,
     ),
     table.node,
