@@ -67,7 +67,7 @@ class Config:
         pulls: Times F is applied to denoise a point.
         terms: Further weighted terms of the loss: name -> {weight, arguments}.
         validation: Share of the points of every observation that is held out of the fit, 0 to 0.5; their mean distance
-            to the fitted surface is the run's score where no truth is known.
+            to the fitted surface, along the normal of the cloud, is the run's score where no truth is known.
         evaluate: What is measured after the fit, where the data have a truth: `task/protocol`, e.g. denoise/sbp.
         media: Keep pictures and 3D models in the run folder; null = wherever a logger is in use.
         recipe: Name of the recipe that was chosen.

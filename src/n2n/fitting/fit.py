@@ -11,10 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import lightning as L
-import numpy as np
 import torch
 from lightning.pytorch.callbacks import ModelCheckpoint
-from numpy.typing import NDArray
 
 from n2n.architectures.base import SDF
 from n2n.compose import config_hash
@@ -24,6 +22,7 @@ from n2n.errors import ConfigError
 from n2n.fitting.assemble import build_field, build_objective, build_optimizer
 from n2n.fitting.callbacks import ProgressReport, Report
 from n2n.fitting.checkpoint import AtomicCheckpointIO, read_state
+from n2n.fitting.held_out import HeldOut
 from n2n.fitting.module import FitModule
 from n2n.fitting.objective import Objective
 from n2n.fitting.prepare import fill_config, prepare
@@ -47,14 +46,14 @@ class FitResult:
         frames: World <-> unit map of each shape.
         config: The configuration with every `auto` filled in.
         report: Measured scales, iterations, seconds, final loss.
-        held_out: Per shape the points that were kept out of the fit, (n, 3) world coordinates.
+        held_out: Per shape the points that were kept out of the fit.
     """
 
     field: SDF
     frames: list[Frame]
     config: dict[str, Any]
     report: dict[str, Any]
-    held_out: list[NDArray[np.float64]]
+    held_out: list[HeldOut]
 
 
 def fit(
@@ -87,8 +86,9 @@ def fit(
     torch.manual_seed(seed)
     device = pick_device(config["device"])
     identity = config_hash({**{k: v for k, v in config.items() if k not in _NOT_THE_FIT}, "data": data.fingerprint()})
-    data, held_out = data.hold_out(config["validation"], seed)
+    data, unseen = data.hold_out(config["validation"], seed)
     shapes = prepare(data, config)
+    held_out = [HeldOut.of(*each) for each in zip(unseen, data.frames, shapes, strict=True)]
     guides = [shape.guide(device, seed) for shape in shapes]
 
     def build(config: dict[str, Any]) -> Objective:
@@ -167,7 +167,7 @@ def fit(
             "outliers": data.outliers,
             "noise": [min(s.scales.noise, s.chosen.noise) * f.scale for s, f in zip(shapes, data.frames, strict=True)],
             "spacing": [s.scales.spacing * f.scale for s, f in zip(shapes, data.frames, strict=True)],
-            "held_out": [len(points) for points in held_out],
+            "held_out": [len(points) for points in unseen],
             "losses": {name: float(value) for name, value in trainer.callback_metrics.items() if name in losses},
             "seconds_prepare": round(prepared - start, 2),
             "seconds_fit": round(time.perf_counter() - prepared, 2),

@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+import point_cloud_utils as pcu
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
@@ -65,6 +66,32 @@ def distances_to_mesh(points: Array, vertices: Array, faces: Index) -> Array:
     """Return the unsigned distance of every point to the mesh, (n,), unit of the coordinates."""
     points, triangles, _ = _centred(points, vertices, faces)
     return np.sqrt(_nearest_triangles(points, triangles)[0])
+
+
+def line_distances(points: Array, directions: Array, vertices: Array, faces: Index) -> Array:
+    """Return how far every point is from the mesh along a line through it, either way.
+
+    Args:
+        points: (n, 3).
+        directions: (n, 3) unit vectors, of any sign.
+        vertices, faces: (v, 3) and (f, 3), same coordinates.
+
+    Returns:
+        (n,) unit of the coordinates, infinite where the line misses the mesh. Rays are traced in single precision.
+
+    >>> corner = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    >>> up = np.array([[0.0, 0, 1], [1, 0, 0]])
+    >>> line_distances(np.array([[0.1, 0.1, 2.0], [0.1, 0.1, 2.0]]), up, corner, np.array([[0, 1, 2]])).round(5)
+    array([ 2., inf])
+    """
+    middle = vertices.mean(axis=0)
+    points, vertices = np.ascontiguousarray(points - middle), np.ascontiguousarray(vertices - middle)
+    ways = []
+    for way in (1.0, -1.0):
+        rays = np.ascontiguousarray(way * directions)
+        face, _, distance = pcu.ray_mesh_intersection(vertices, np.ascontiguousarray(faces), points, rays)
+        ways.append(np.where(face >= 0, distance, np.inf))
+    return np.minimum(*ways)
 
 
 def closest_on_mesh(points: Array, vertices: Array, faces: Index) -> Array:

@@ -14,14 +14,16 @@ from n2n.errors import InputError
 from n2n.fitting.assemble import build_field
 from n2n.fitting.checkpoint import read_state, unreadable, write_state
 from n2n.fitting.fit import FitResult, pick_device
+from n2n.fitting.held_out import HeldOut
 from n2n.geometry.frame import Frame
 from n2n.geometry.sparse_grid import triple
-from n2n.metrics.point_mesh import distances_to_mesh
+from n2n.metrics.point_mesh import distances_to_mesh, line_distances
 from n2n.tasks.points import denoise_points, upsample_points
 from n2n.tasks.surface import field_box, reconstruct_surface
 
 FIELD_FILE = "field.ckpt"
 _MOSTLY = 0.5
+_FAR = 4.0
 
 
 @dataclass
@@ -50,7 +52,7 @@ class Field:
             SurfaceError: There is no surface that points could be held against.
         """
         field = cls(result.field, result.frames, result.config, result.report)
-        if any(map(len, result.held_out)):
+        if any(len(unseen.points) for unseen in result.held_out):
             field.report["validation"], field.report["validation_relative"] = _score(field, result.held_out)
         return field
 
@@ -155,15 +157,19 @@ class Field:
         return cls(sdf.eval().to(pick_device(device)), frames, state["config"], state["report"])
 
 
-def _score(field: Field, held_out: list[NDArray[np.float64]]) -> tuple[float, float]:
-    """Return the mean distance of held-out points to the surface, in world units and in units of the noise.
+def _score(field: Field, held_out: list[HeldOut]) -> tuple[float, float]:
+    """Return the mean distance of held-out points to the surface along their lines, in world units and of the noise.
 
-    The surface itself is what they are held against: a field whose values shrink would look ever closer.
+    The surface itself is what they are held against: a field whose values shrink would look ever closer. A line that
+    misses it, or meets it far away, counts as four times the usual distance.
     """
     distances, relative = [], []
-    for shape, (points, noise) in enumerate(zip(held_out, field.report["noise"], strict=True)):
+    for shape, (unseen, noise) in enumerate(zip(held_out, field.report["noise"], strict=True)):
         mesh = field.reconstruct(shape=shape)
-        distances.append(distances_to_mesh(points, np.asarray(mesh.vertices), np.asarray(mesh.faces)))
+        surface = np.asarray(mesh.vertices), np.asarray(mesh.faces)
+        usual = np.median(distances_to_mesh(unseen.points, *surface))
+        along = line_distances(unseen.points, unseen.directions, *surface)
+        distances.append(np.minimum(along, _FAR * usual))
         relative.append(distances[-1] / noise)
     return float(np.concatenate(distances).mean()), float(np.concatenate(relative).mean())
 

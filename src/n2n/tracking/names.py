@@ -24,7 +24,7 @@ NOISE = "noise"  # estimated, world units; mean over the shapes
 SPACING = "spacing"  # estimated, world units; mean over the shapes
 VOXEL = "voxel"  # finest cell of a grid, world units
 SECONDS = "seconds"
-VALIDATION = "validation"  # mean distance of held-out points to the fitted surface, world units
+VALIDATION = "validation"  # mean distance of held-out points to the fitted surface along normals, world units
 VALIDATION_RELATIVE = "validation_relative"  # the same, in units of the estimated noise; 0.80 for a perfect surface
 RESULTS = (NOISE, SPACING, VOXEL, SECONDS, VALIDATION, VALIDATION_RELATIVE)
 

@@ -15,8 +15,11 @@ from n2n.datamodules.observations import ObservationsDataModule
 from n2n.errors import ConfigError, SurfaceError
 from n2n.evaluation.protocol import load_protocol
 from n2n.fitting.fit import FitResult
+from n2n.fitting.held_out import HeldOut
+from n2n.fitting.prepare import prepare
 from n2n.geometry.frame import Frame
 from n2n.geometry.reference import Reference
+from n2n.metrics.point_mesh import distances_to_mesh
 from n2n.tasks.field import Field
 from n2n.tracking import media, names
 from n2n.tracking.results import check_evaluations, evaluate, results
@@ -26,8 +29,11 @@ CENTRE, SCALE = np.array([5.0e5, 4.0e6, 100.0]), 10.0  # as in a map projection,
 
 
 def directions(count, seed):
-    points = np.random.default_rng(seed).normal(size=(count, 3))
-    return points / np.linalg.norm(points, axis=1, keepdims=True)
+    return unit_vectors(np.random.default_rng(seed).normal(size=(count, 3)))
+
+
+def unit_vectors(vectors):
+    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
 
 
 @pytest.fixture(scope="module")
@@ -50,9 +56,18 @@ class Sphere(SDF):
         return points.norm(dim=-1) - self.radius
 
 
+class Bumpy(Sphere):
+    """A sphere with waves that are finer than the noise."""
+
+    def forward(self, points, condition=None):
+        return super().forward(points) + 0.02 * torch.sin(60 * points).prod(dim=-1)
+
+
 def scored(field, held_out, noise):
+    """Score a field by points whose lines go through the middle of the sphere."""
     frames = field.frames * len(held_out)
-    return Field.of(FitResult(field.sdf, frames, field.config, {"noise": noise}, held_out)).report
+    unseen = [HeldOut(points, unit_vectors(points - CENTRE)) for points in held_out]
+    return Field.of(FitResult(field.sdf, frames, field.config, {"noise": noise}, unseen)).report
 
 
 def test_held_out_points_score_by_their_distance_to_the_surface(sphere):
@@ -65,6 +80,29 @@ def test_held_out_points_score_by_their_distance_to_the_surface(sphere):
     pair = scored(field, [inner, outer], [0.3, 0.25])
     assert pair["validation_relative"] == pytest.approx((1 + 2) / 2, rel=0.01)
     assert "validation" not in scored(field, [np.empty((0, 3))], [0.8])
+
+
+def test_a_surface_that_follows_noise_is_nearer_to_all_points_and_scores_worse(sphere):
+    field, radius = sphere
+    noise = 0.02 * field.frames[0].scale
+    points = CENTRE + (radius + np.random.default_rng(0).normal(0, noise, (2000, 1))) * directions(2000, 1)
+    bumpy = Field(Bumpy(field.sdf.radius.item()), field.frames, field.config)
+    nearest = []
+    for one in (field, bumpy):
+        mesh = one.reconstruct()
+        nearest.append(distances_to_mesh(points, np.asarray(mesh.vertices), np.asarray(mesh.faces)).mean())
+    smooth, rough = (scored(one, [points], [noise])["validation"] for one in (field, bumpy))
+    assert nearest[1] < nearest[0] and rough > 1.02 * smooth
+    assert smooth == pytest.approx(0.8 * noise, rel=0.05)
+
+
+def test_held_out_points_measure_along_the_normal_of_those_that_were_kept():
+    truth = directions(5000, 0)
+    cloud = truth * (1 + np.random.default_rng(1).normal(0, 0.02, (5000, 1)))
+    data, unseen = ObservationsDataModule([[cloud]]).hold_out(0.1, seed=0)
+    held_out = HeldOut.of(unseen[0], data.frames[0], prepare(data, compose(["scaffold=false"]))[0])
+    cosine = np.abs((held_out.directions * unit_vectors(held_out.points)).sum(axis=1))
+    assert len(cosine) == 500 and np.median(cosine) > 0.99 and np.quantile(cosine, 0.05) > 0.95
 
 
 def test_a_field_without_a_surface_is_no_good_score(sphere):
@@ -103,7 +141,7 @@ def test_held_out_points_take_no_part(tmp_path):
     fields = [fit(data, config) for data in (first, second)]
     one, two = (result.field.state_dict() for result in fields)
     assert all(torch.equal(one[key], two[key]) for key in one)
-    assert not np.allclose(fields[0].held_out[0], fields[1].held_out[0])
+    assert not np.allclose(fields[0].held_out[0].points, fields[1].held_out[0].points)
 
 
 def test_evaluations_are_those_of_the_protocol(sphere, tmp_path):
