@@ -29,7 +29,10 @@ def render(title: str, about: list[str], grid: Grid) -> Rendered:
         grid: The cells; ours may stand in rows or columns of their own.
     """
     notes = _Notes()
-    rows = [[row, *(_text(grid.cells.get((row, column)), notes) for column in grid.columns)] for row in grid.rows]
+    rows = [
+        [row, *(_IN_MARKDOWN.write(grid.cells.get((row, column)), notes) for column in grid.columns)]
+        for row in grid.rows
+    ]
     mine = [cell for cell in grid.cells.values() if cell.origin == OURS]
     return Rendered(
         markdown=_markdown(title, about, grid, rows, notes.lines),
@@ -69,15 +72,27 @@ def _remarks(cell: Cell) -> list[str]:
     return [*cell.notes, *([cell.reason] if cell.value is None and cell.origin != PAPER else [])]
 
 
-def _text(cell: Cell | None, notes: _Notes) -> str:
-    if cell is None:
-        return ""
-    marks = notes.mark(_remarks(cell))
-    raised = f"<sup>{marks}</sup>" if marks else ""
-    if cell.value is None:
-        return f"-{raised}"
-    text = number(cell.value)
-    return f"{f'**{text}**' if cell.bold else text}{raised}"
+@dataclass(frozen=True)
+class _Notation:
+    """How a cell is written: templates of footnote marks and of bold numbers, and a dash."""
+
+    raised: str
+    bold: str
+    dash: str
+
+    def write(self, cell: Cell | None, notes: _Notes) -> str:
+        if cell is None:
+            return ""
+        marks = notes.mark(_remarks(cell))
+        raised = self.raised.format(marks) if marks else ""
+        if cell.value is None:
+            return self.dash + raised
+        text = number(cell.value)
+        return (self.bold.format(text) if cell.bold else text) + raised
+
+
+_IN_MARKDOWN = _Notation("<sup>{}</sup>", "**{}**", "-")
+_IN_LATEX = _Notation("$^{{{}}}$", r"\textbf{{{}}}", "--")
 
 
 def _markdown(title: str, about: list[str], grid: Grid, rows: list[list[str]], notes: list[str]) -> str:
@@ -104,23 +119,12 @@ def _latex(title: str, grid: Grid, notes: _Notes) -> str:
         r"\midrule",
     ]
     for row in grid.rows:
-        cells = [_tex(grid.cells.get((row, column)), notes) for column in grid.columns]
+        cells = [_IN_LATEX.write(grid.cells.get((row, column)), notes) for column in grid.columns]
         lines.append(" & ".join([_escape(row), *cells]) + r" \\")
     lines += [r"\bottomrule", r"\end{tabular}"]
     lines += [rf"\par\footnotesize $^{{{i}}}$ {_escape(text)}" for i, text in enumerate(notes.lines, 1)]
     lines += [rf"\par\footnotesize {_escape(text)}" for text in grid.remarks]
     return "\n".join([*lines, r"\end{table}", ""])
-
-
-def _tex(cell: Cell | None, notes: _Notes) -> str:
-    if cell is None:
-        return ""
-    marks = notes.mark(_remarks(cell))
-    raised = f"$^{{{marks}}}$" if marks else ""
-    if cell.value is None:
-        return f"--{raised}"
-    text = number(cell.value)
-    return (rf"\textbf{{{text}}}" if cell.bold else text) + raised
 
 
 _TEX = str.maketrans(
