@@ -22,12 +22,14 @@ class HeldOut:
 
     Attributes:
         points: (n, 3) world coordinates.
-        directions: (n, 3) unit vectors: the normal that the kept points around suggest. It depends on no setting of the
-            fit. Along the way to the nearest point of the surface instead, a bumpy one would seem close to everything.
+        directions: (n, 3) unit vectors: the normal that the kept points around suggest, whatever surface is fitted to
+            them. Along the way to the nearest point of that surface a bumpy one would seem close to everything.
+        noise: Deviation of the points' noise, measured before the fit, world units.
     """
 
     points: NDArray[np.float64]
     directions: NDArray[np.float64]
+    noise: float
 
     @classmethod
     def of(cls, points: NDArray[np.float64], frame: Frame, shape: Shape) -> "HeldOut":
@@ -38,11 +40,12 @@ class HeldOut:
             frame: World <-> unit map.
             shape: The points that were kept, measured.
         """
+        kept, chosen = shape.sample, shape.chosen
+        noise = chosen.noise * frame.scale
         some = points[:: max(1, math.ceil(len(points) / _MAX_POINTS))]
         if not len(some):
-            return cls(some, some)
-        kept, chosen = shape.sample, shape.chosen
+            return cls(some, some, noise)
         # Points within a disk of this width.
         wanted = math.pi * (_WIDTH * chosen.noise) ** 2 * len(kept) / chosen.area
         neighbours = int(np.clip(wanted, *_NEIGHBOURS))
-        return cls(some, project_to_quadric(cKDTree(kept), frame.to_unit(some), neighbours)[1])
+        return cls(some, project_to_quadric(cKDTree(kept), frame.to_unit(some), neighbours)[1], noise)

@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 _CHUNK = 1 << 16
+_CROSSINGS = 8  # of a line, either way
+_BEYOND, _PRECISION = 1e-3, 1e-5  # from one crossing to the next, of the reach; of the mesh's size
 
 
 class PointMesh(NamedTuple):
@@ -68,30 +70,42 @@ def distances_to_mesh(points: Array, vertices: Array, faces: Index) -> Array:
     return np.sqrt(_nearest_triangles(points, triangles)[0])
 
 
-def line_distances(points: Array, directions: Array, vertices: Array, faces: Index) -> Array:
-    """Return how far every point is from the mesh along a line through it, either way.
+def line_distances(points: Array, directions: Array, vertices: Array, faces: Index, reach: float) -> Array:
+    """Return how far every point is from the mesh along a line through it.
 
     Args:
         points: (n, 3).
         directions: (n, 3) unit vectors, of any sign.
         vertices, faces: (v, 3) and (f, 3), same coordinates.
+        reach: Crossings farther away are of some other part of the mesh.
 
     Returns:
-        (n,) unit of the coordinates, infinite where the line misses the mesh. Rays are traced in single precision.
+        (n,) unit of the coordinates: the mean distance of the crossings within reach, as a surface that crosses the line
+        again and again is no better for being close somewhere; `reach` where there is none. Rays are traced in single
+        precision.
 
     >>> corner = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
     >>> up = np.array([[0.0, 0, 1], [1, 0, 0]])
-    >>> line_distances(np.array([[0.1, 0.1, 2.0], [0.1, 0.1, 2.0]]), up, corner, np.array([[0, 1, 2]])).round(5)
-    array([ 2., inf])
+    >>> line_distances(np.array([[0.1, 0.1, 2.0]] * 2), up, corner, np.array([[0, 1, 2]]), reach=3.0).round(5)
+    array([2., 3.])
     """
     middle = vertices.mean(axis=0)
-    points, vertices = np.ascontiguousarray(points - middle), np.ascontiguousarray(vertices - middle)
-    ways = []
-    for way in (1.0, -1.0):
-        rays = np.ascontiguousarray(way * directions)
-        face, _, distance = pcu.ray_mesh_intersection(vertices, np.ascontiguousarray(faces), points, rays)
-        ways.append(np.where(face >= 0, distance, np.inf))
-    return np.minimum(*ways)
+    vertices, faces = np.ascontiguousarray(vertices - middle), np.ascontiguousarray(faces)
+    start, ray = np.tile(points - middle, (2, 1)), np.concatenate([directions, -directions])
+    beyond = max(_BEYOND * reach, _PRECISION * float(np.abs(vertices).max()))
+    travelled, total, count = np.zeros(len(ray)), np.zeros(len(ray)), np.zeros(len(ray))
+    for _ in range(_CROSSINGS):
+        face, _, step = pcu.ray_mesh_intersection(vertices, faces, start + travelled[:, None] * ray, ray)
+        crossing = travelled + np.where(face >= 0, step, np.inf)
+        is_near = crossing <= reach
+        if not is_near.any():
+            break
+        total[is_near] += crossing[is_near]
+        count[is_near] += 1
+        # Those that are through start once more from where they are, to no effect.
+        travelled = np.where(is_near, crossing + beyond, reach)
+    total, count = total.reshape(2, -1).sum(axis=0), count.reshape(2, -1).sum(axis=0)
+    return np.where(count > 0, total / np.maximum(count, 1), reach)
 
 
 def closest_on_mesh(points: Array, vertices: Array, faces: Index) -> Array:

@@ -23,7 +23,7 @@ from n2n.tasks.surface import field_box, reconstruct_surface
 
 FIELD_FILE = "field.ckpt"
 _MOSTLY = 0.5
-_FAR = 4.0
+_FAR, _FAR_NOISE = 4.0, 2.5  # median distances; deviations of the noise
 
 
 @dataclass
@@ -160,16 +160,16 @@ class Field:
 def _score(field: Field, held_out: list[HeldOut]) -> tuple[float, float]:
     """Return the mean distance of held-out points to the surface along their lines, in world units and of the noise.
 
-    The surface itself is what they are held against: a field whose values shrink would look ever closer. A line that
-    misses it, or meets it far away, counts as four times the usual distance.
+    The surface itself is what they are held against: a field whose values shrink would look ever closer. How far is too
+    far is not up to the surface alone: a bumpy one is near.
     """
     distances, relative = [], []
     for shape, (unseen, noise) in enumerate(zip(held_out, field.report["noise"], strict=True)):
         mesh = field.reconstruct(shape=shape)
         surface = np.asarray(mesh.vertices), np.asarray(mesh.faces)
-        usual = np.median(distances_to_mesh(unseen.points, *surface))
-        along = line_distances(unseen.points, unseen.directions, *surface)
-        distances.append(np.minimum(along, _FAR * usual))
+        usual = float(np.median(distances_to_mesh(unseen.points, *surface)))
+        reach = max(_FAR * usual, _FAR_NOISE * unseen.noise)
+        distances.append(line_distances(unseen.points, unseen.directions, *surface, reach))
         relative.append(distances[-1] / noise)
     return float(np.concatenate(distances).mean()), float(np.concatenate(relative).mean())
 

@@ -7,7 +7,7 @@ from scipy.optimize import nnls
 
 from n2n.errors import InputError
 from n2n.metrics import box_tree
-from n2n.metrics.point_mesh import closest_on_mesh, distances_to_mesh, point_to_mesh
+from n2n.metrics.point_mesh import closest_on_mesh, distances_to_mesh, line_distances, point_to_mesh
 
 TRIANGLE = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
 FACE = np.array([[0, 1, 2]])
@@ -119,3 +119,21 @@ def test_utm_coordinates_lose_little():
 def test_meshes_that_are_none_are_named(faces, message):
     with pytest.raises(InputError, match=message):
         point_to_mesh(np.zeros((1, 3)), TRIANGLE, faces)
+
+
+def test_lines_meet_the_mesh_where_geometry_says():
+    """A sphere, whose crossings with a line are known: lines through the middle, and lines past it."""
+    sphere = trimesh.creation.icosphere(5, radius=2.0)
+    vertices, faces = np.asarray(sphere.vertices) + 100.0, np.asarray(sphere.faces)
+    out = np.random.default_rng(0).normal(size=(200, 3))
+    out /= np.linalg.norm(out, axis=1, keepdims=True)
+    points = 100.0 + 1.5 * out
+    near = line_distances(points, -out, vertices, faces, reach=1.0)
+    np.testing.assert_allclose(near, 0.5, atol=0.003)
+    both = line_distances(points, out, vertices, faces, reach=4.0)  # 0.5 one way, 3.5 the other
+    np.testing.assert_allclose(both, 2.0, atol=0.003)
+    aside = np.cross(out, [0.0, 0.0, 1.0])
+    past = line_distances(100.0 + 3.0 * out, aside / np.linalg.norm(aside, axis=1, keepdims=True), vertices, faces, 0.7)
+    np.testing.assert_array_equal(past, 0.7)
+    alone = line_distances(points[:1], out[:1], vertices, faces, reach=1.0)
+    np.testing.assert_allclose(alone, [0.5], atol=0.003)

@@ -59,14 +59,26 @@ class Sphere(SDF):
 class Bumpy(Sphere):
     """A sphere with waves that are finer than the noise."""
 
+    def __init__(self, radius, height):
+        super().__init__(radius)
+        self.height = height
+
     def forward(self, points, condition=None):
-        return super().forward(points) + 0.02 * torch.sin(60 * points).prod(dim=-1)
+        return super().forward(points) + self.height * torch.sin(60 * points).prod(dim=-1)
+
+
+class Folded(Sphere):
+    """Three spheres, one within the other, where one would do."""
+
+    def forward(self, points, condition=None):
+        height = super().forward(points)
+        return height * (height.square() / 0.026**2 - 1)
 
 
 def scored(field, held_out, noise):
     """Score a field by points whose lines go through the middle of the sphere."""
     frames = field.frames * len(held_out)
-    unseen = [HeldOut(points, unit_vectors(points - CENTRE)) for points in held_out]
+    unseen = [HeldOut(p, unit_vectors(p - CENTRE), sigma) for p, sigma in zip(held_out, noise, strict=True)]
     return Field.of(FitResult(field.sdf, frames, field.config, {"noise": noise}, unseen)).report
 
 
@@ -86,14 +98,17 @@ def test_a_surface_that_follows_noise_is_nearer_to_all_points_and_scores_worse(s
     field, radius = sphere
     noise = 0.02 * field.frames[0].scale
     points = CENTRE + (radius + np.random.default_rng(0).normal(0, noise, (2000, 1))) * directions(2000, 1)
-    bumpy = Field(Bumpy(field.sdf.radius.item()), field.frames, field.config)
-    nearest = []
-    for one in (field, bumpy):
+    unit = field.sdf.radius.item()
+    sdfs = [field.sdf, *(Bumpy(unit, height) for height in (0.02, 0.03, 0.045)), Folded(unit)]
+    nearest, scores = [], []
+    for one in (Field(sdf, field.frames, field.config) for sdf in sdfs):
         mesh = one.reconstruct()
         nearest.append(distances_to_mesh(points, np.asarray(mesh.vertices), np.asarray(mesh.faces)).mean())
-    smooth, rough = (scored(one, [points], [noise])["validation"] for one in (field, bumpy))
-    assert nearest[1] < nearest[0] and rough > 1.02 * smooth
-    assert smooth == pytest.approx(0.8 * noise, rel=0.05)
+        scores.append(scored(one, [points], [noise])["validation"] / noise)
+    smooth, *bumpy, folded = scores
+    assert smooth == pytest.approx(0.8, rel=0.05)
+    assert nearest[1] < nearest[0] and nearest[-1] < 0.6 * nearest[0]
+    assert 1.02 * smooth < bumpy[0] < 0.97 * bumpy[1] < 0.94 * bumpy[2] and folded > 1.2 * smooth
 
 
 def test_held_out_points_measure_along_the_normal_of_those_that_were_kept():
