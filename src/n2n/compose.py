@@ -53,6 +53,15 @@ def hydra_arguments(overrides: Sequence[str]) -> list[str]:
     return [*opened, *([f"hydra.searchpath=[{','.join(search)}]"] if search else [])]
 
 
+def sweep_dir(folder: Path) -> str:
+    """Return the setting that tells Hydra the folder of a sweep, whatever is in its name.
+
+    >>> print(sweep_dir(Path("it's")))
+    hydra.sweep.dir='it\\'s'
+    """
+    return "hydra.sweep.dir='" + str(folder).replace("'", r"\'") + "'"
+
+
 def compose(overrides: Sequence[str] = ()) -> dict[str, Any]:
     """Compose conf/config.yaml with overrides such as `recipe=paper` or `iterations=500`.
 

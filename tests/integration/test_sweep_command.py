@@ -14,8 +14,7 @@ import numpy as np
 import pytest
 
 from n2n.cli.main import main
-from n2n.cli.multirun import _report
-from n2n.errors import ConfigError
+from n2n.cli.multirun import OtherRunsError, _report
 from n2n.sweeps.grid import Grid
 from n2n.sweeps.status import Status
 from n2n.sweeps.store import Sweep
@@ -125,13 +124,25 @@ def test_a_command_that_means_other_runs_now_keeps_no_other_from_its_own(capsys,
     def fit(settings, flags, states, sweep):
         given.append(settings[0])
         if settings[0] == "seed=0,1":
-            raise ConfigError("it means other runs")
+            raise OtherRunsError("it means other runs")
         return 0
 
     monkeypatch.setattr("n2n.cli.multirun.run_multirun", fit)
     assert main(["sweep", "resume", "x"]) == 2
     assert sorted(given) == ["seed=0,1", "seed=2,3"]
     assert "it means other runs" in capsys.readouterr().err
+
+
+def test_a_refused_command_is_the_one_to_give_again_and_the_home_is_where_it_was_given(capsys, monkeypatch):
+    Sweep.plan("x", ["-m", "sweep=x", "seed=0,1"], {"seed": ["0", "1"]}, {"gone": ["seed=0"]})
+    Path("sweeps/y").mkdir()
+    monkeypatch.chdir("sweeps/y")
+    assert main(["sweep", "resume", "../x"]) == 2
+    said = capsys.readouterr().err
+    assert "sweeps/x: its command means other runs" in said and "n2n fit -m sweep=x seed=0,1" in said
+    monkeypatch.chdir("../x")
+    assert main(["sweep", "resume", "../x"]) == 2
+    assert "means other runs" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("jobs", "verb"), [([], "retry"), (None, "results")])

@@ -20,6 +20,10 @@ from n2n.sweeps.watch import Watch
 _DONE, _NOT_DONE = 0, 2
 
 
+class OtherRunsError(ConfigError):
+    """The command of a sweep means other runs than when it was given."""
+
+
 def run_multirun(
     settings: list[str], flags: list[str], states: Sequence[str] = STATES, resumed: Sweep | None = None
 ) -> int:
@@ -73,7 +77,7 @@ def _plan(name: str, settings: list[str], flags: list[str], grid: Grid) -> Sweep
 def _same(sweep: Sweep, grid: Grid) -> Sweep:
     """Return the sweep, after a check that its command still means the same runs."""
     if any(job.hash not in sweep.planned for job in grid.jobs or []):
-        raise ConfigError(
+        raise OtherRunsError(
             f"{sweep.folder}: its command means other runs than when it was made: the defaults in conf/ or n2n itself "
             f"have changed. To fit those, give the command again: n2n fit {shlex.join(sweep.command)}"
         )

@@ -1,6 +1,7 @@
 """`n2n sweep`: the sweeps that `n2n fit -m` makes; looked at, resumed, read."""
 
 import argparse
+import os
 import shlex
 import sys
 from contextlib import chdir
@@ -118,7 +119,7 @@ def _results(sweep, output: Path | None) -> int:
 
 def _resume(sweep, settings: list[str], states: tuple[str, ...]) -> int:
     """Run the sweep's commands again, for runs in these states."""
-    from n2n.cli.multirun import run_multirun
+    from n2n.cli.multirun import OtherRunsError, run_multirun
     from n2n.errors import ConfigError
     from n2n.sweeps.command import is_about_launcher, split_arguments, take_name
 
@@ -130,22 +131,22 @@ def _resume(sweep, settings: list[str], states: tuple[str, ...]) -> int:
         )
     codes, refused = [], []
     # Paths in the command are those of the folder it was given in.
-    folder = sweep.folder.absolute()
+    folder = Path(os.path.abspath(sweep.folder))  # `..` would make its parent another folder
     home = folder.parent.parent
-    sweep = replace(sweep, folder=folder.relative_to(home))
     with chdir(home):
         for command in sweep.commands:
             kept, flags = split_arguments(command)
             if any(text.startswith("hydra/launcher=") for text in settings):
                 kept = [text for text in kept if not is_about_launcher(text)]
-            wanted = [*take_name(kept)[1], *settings, f"sweep={sweep.name}"]
+            wanted = [*take_name(kept)[1], *settings, f"sweep={folder.name}"]
+            part = replace(sweep, folder=folder.relative_to(home), command=command)
             try:
-                codes.append(run_multirun(wanted, flags, states, sweep))
-            except ConfigError as error:
-                # One whose defaults have changed since keeps no other from its runs.
+                codes.append(run_multirun(wanted, flags, states, part))
+            except OtherRunsError as error:
+                # A command whose defaults have changed since keeps no other from its runs.
                 refused.append(str(error))
     if refused:
-        raise ConfigError("\n".join(refused))
+        raise OtherRunsError("\n".join(refused))
     return codes[-1]
 
 

@@ -5,11 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from n2n.cli.console import progress_bar, say
+from n2n.sweeps.launchers import told_threads
 from n2n.tables.launch import launch
 from n2n.tables.methods import not_installed
 from n2n.tables.plan import Job, Plan, estimate
 from n2n.tables.run import run as run_plan
-from n2n.tables.shared import measured_now, open_jobs
+from n2n.tables.shared import failure, measured_now, open_jobs
 from n2n.tables.store import Store
 from n2n.tables.write import write_tables
 
@@ -96,7 +97,7 @@ def _measure_here(request: Request, total: int, before: int) -> list[tuple[Job, 
             if error:
                 say(f"failed: {_described(job)}: {error}")
 
-        return run_plan(request.plan, request.store, request.workers, request.again, told)
+        return run_plan(request.plan, request.store, request.workers, request.again, told, threads=told_threads())
 
 
 def _measure_launched(request: Request, total: int, before: int) -> list[tuple[Job, str]]:
@@ -126,8 +127,8 @@ def status(request: Request) -> int:
     failed = []
     for job in plan.jobs.values():
         record = store.read(job.fit)
-        if record is not None and record["status"] == "failed":
-            failed.append(f"failed: {_described(job)}: {record['error']}")
+        if record is not None and (error := failure(record)):
+            failed.append(f"failed: {_described(job)}: {error}")
     busy = [f"being measured: {_described(job)}" for job in measured_now(plan, store)]
     damaged = _damaged(plan, store)
     counts = [f"damaged: {len(damaged)}; `n2n tables run` measures them again"] if damaged else []

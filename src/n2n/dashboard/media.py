@@ -112,15 +112,15 @@ def _read_mesh(path: Path, problems: list[str]) -> tuple[NDArray[np.float64], ND
         vertices, faces = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
         if not len(faces) or not np.isfinite(vertices).all():
             raise ValueError("no faces, or coordinates that are no numbers")
+        if faces.min() < 0 or faces.max() >= len(vertices):
+            raise ValueError("faces of vertices that are not there")
     except Exception as error:  # trimesh raises whatever its readers meet
-        problems.append(f"{path.name}: cannot be shown ({' '.join(str(error).split()) or type(error).__name__})")
+        problems.append(f"{path.name}: cannot be shown ({_told(error)})")
         return None
     return vertices, faces
 
 
 def _read_cloud(path: Path, problems: list[str]) -> tuple[NDArray[np.float64], NDArray[np.float64] | None] | None:
-    import zipfile
-
     if not path.exists():
         return None
     try:
@@ -131,10 +131,14 @@ def _read_cloud(path: Path, problems: list[str]) -> tuple[NDArray[np.float64], N
             raise ValueError("points must be finite and have 3 columns")
         if error is not None and error.shape != (len(points),):
             raise ValueError("error must have one number for each point")
-    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
-        problems.append(f"{path.name}: cannot be shown ({error})")
+    except Exception as error:  # a damaged archive raises whatever its parts do
+        problems.append(f"{path.name}: cannot be shown ({_told(error)})")
         return None
     return points, error
+
+
+def _told(error: Exception) -> str:
+    return " ".join(str(error).split()) or type(error).__name__
 
 
 def _encode(values: NDArray, kind: str) -> str:

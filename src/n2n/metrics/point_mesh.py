@@ -80,9 +80,9 @@ def line_distances(points: Array, directions: Array, vertices: Array, faces: Ind
         reach: Crossings farther away are of some other part of the mesh.
 
     Returns:
-        (n,) unit of the coordinates: the mean distance of the crossings within reach, as a surface that crosses the line
-        again and again is no better for being close somewhere; `reach` where there is none. Rays are traced in single
-        precision.
+        (n,) unit of the coordinates: the mean distance of the crossings within reach, as a surface that crosses the
+        line again and again is no better for being close somewhere; `reach` where there is none. Rays are traced in
+        single precision.
 
     >>> corner = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
     >>> up = np.array([[0.0, 0, 1], [1, 0, 0]])

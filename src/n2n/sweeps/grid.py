@@ -17,7 +17,7 @@ from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.types import RunMode
 from omegaconf import OmegaConf, open_dict, read_write
 
-from n2n.compose import check_choices, conf_dir, config_hash, hydra_arguments, register_schema, validate
+from n2n.compose import check_choices, conf_dir, config_hash, hydra_arguments, register_schema, sweep_dir, validate
 from n2n.errors import ConfigError
 from n2n.messages import explain
 
@@ -79,7 +79,7 @@ def make_grid(settings: Sequence[str], flags: Sequence[str], folder: Path) -> Gr
     GlobalHydra.instance().clear()
     try:
         hydra = Hydra.create_main_hydra2(task_name="n2n", config_search_path=_search_path(options))
-        overrides = [*hydra_arguments(settings), f"hydra.sweep.dir='{folder}'"]
+        overrides = [*hydra_arguments(settings), sweep_dir(folder)]
         config_name = options.config_name or "config"
         master = hydra.compose_config(config_name, overrides, RunMode.MULTIRUN, with_log_configuration=False)
         arguments = [*map(str, OmegaConf.to_container(master.hydra.overrides.task))]

@@ -7,7 +7,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from n2n.compose import conf_dir, hydra_arguments, register_schema
+from n2n.compose import conf_dir, hydra_arguments, register_schema, sweep_dir
 from n2n.errors import ConfigError, N2NError
 from n2n.messages import explain
 
@@ -64,7 +64,7 @@ def start(launcher: str, settings: Sequence[str], folder: Path, count: int, work
     from hydra.types import HydraContext
 
     register_schema()
-    overrides = hydra_arguments([f"hydra/launcher={launcher}", *settings, f"hydra.sweep.dir='{folder}'"])
+    overrides = hydra_arguments([f"hydra/launcher={launcher}", *settings, sweep_dir(folder)])
     try:
         with initialize_config_dir(str(conf_dir()), version_base="1.3", job_name="n2n"):
             config = compose("config", overrides=overrides, return_hydra_config=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 from n2n.sweeps.launchers import start, told_threads
 from n2n.tables.plan import Job, Plan, cores
 from n2n.tables.run import run
-from n2n.tables.shared import now, open_jobs
+from n2n.tables.shared import failed_since, now, open_jobs
 from n2n.tables.store import Store
 
 _WORKERS = ".workers"  # in the results folder: the launcher's logs
@@ -62,18 +62,12 @@ def launch(
     if not jobs:
         return []
     since, workers = now(store), min(workers, len(jobs))
-    told_threads()  # what is wrong with it is said here, not by every worker
-    if launcher in _ON_THIS_MACHINE:
-        os.environ.setdefault("OMP_NUM_THREADS", str(max(1, cores() // workers)))
+    told = told_threads()  # what is wrong with it is said here, not by every worker
+    if launcher in _ON_THIS_MACHINE and told is None:
+        os.environ["OMP_NUM_THREADS"] = str(max(1, cores() // workers))
     worker = Worker(plan, store.folder.absolute(), again, since, Path.cwd())
     start(launcher, settings, worker.results / _WORKERS, workers, worker)
-    return [(job, error) for job in jobs if (error := _failure(job, store, since))]
-
-
-def _failure(job: Job, store: Store, since: float) -> str:
-    record = store.read(job.fit)
-    is_failure = record is not None and record["status"] == "failed"
-    return record["error"] if is_failure and store.path(job.fit).stat().st_mtime > since else ""
+    return [(job, error) for job in jobs if (error := failed_since(job.fit, store, since))]
 
 
 def _tell(job: Job, error: str) -> None:

@@ -57,7 +57,7 @@ class _Notes:
 
 
 def number(value: float) -> str:
-    """Write a number with three decimals, or with three significant digits where it is small or large.
+    """Write a number with three decimals, or with three significant digits where it is small, none where it is large.
 
     >>> number(4.2211), number(0.00123), number(1234.5)
     ('4.221', '0.00123', '1234')

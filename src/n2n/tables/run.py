@@ -55,9 +55,9 @@ def run(
     def finish(job: Job, record: Record) -> None:
         error = record.get("error", "")
         before = store.read(job.fit)
-        # A failure never replaces numbers.
-        if not error or before is None or before["status"] != "done":
-            store.write(job.fit, record)
+        # A failure never replaces numbers; it is noted beside them, so that nobody else tries.
+        is_lost = error and before is not None and before["status"] == "done"
+        store.write(job.fit, {**before, "failed_again": error} if is_lost else record)
         share.release(job)
         settle(job, error)
 

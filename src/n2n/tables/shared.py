@@ -4,6 +4,7 @@ import uuid
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
+from typing import Any
 
 from n2n.errors import OutputError
 from n2n.formats.atomic import make_folder
@@ -61,17 +62,28 @@ class Share:
 
     def _look(self, job: Job) -> tuple[str, str]:
         record = self._store.read(job.fit)
-        if record is not None and record["status"] == "failed":
-            is_new = self._store.path(job.fit).stat().st_mtime > self._since
-            return (FAILED, record["error"]) if is_new else (MINE, "")
-        if self._plan.is_done(job, self._store) and not (self._again and record["made"]["sources"] != sources()):
+        is_stale = self._again and record is not None and record.get("made", {}).get("sources") != sources()
+        if self._plan.is_done(job, self._store) and not is_stale:
             return DONE, ""
-        return MINE, ""
+        error = failed_since(job.fit, self._store, self._since)
+        return (FAILED, error) if error else (MINE, "")
 
 
 def open_jobs(plan: Plan, store: Store, again: bool = False) -> list[Job]:
     """Return what is to be done at present, by whomsoever; `again`: also what was done by other sources."""
     return plan.open(store) + (plan.stale(store) if again else [])
+
+
+def failed_since(fit: Fit, store: Store, since: float) -> str:
+    """Return why a fit failed; empty where it did not, or before `since` by the clock of the folder."""
+    record = store.read(fit)
+    error = "" if record is None else failure(record)
+    return error if error and store.path(fit).stat().st_mtime > since else ""
+
+
+def failure(record: dict[str, Any]) -> str:
+    """Return why a fit failed, or failed again after it had been measured; empty where it did not."""
+    return record["error"] if record["status"] == "failed" else record.get("failed_again", "")
 
 
 def measured_now(plan: Plan, store: Store) -> list[Job]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from n2n.evaluation.runs import noisy_points
 from n2n.formats import atomic_path, write_mesh
+from n2n.formats.atomic import make_folder
 from n2n.metrics.nearest import nearest
 from n2n.metrics.point_mesh import distances_to_mesh
 from n2n.report.figures.errors import upper
@@ -61,7 +62,7 @@ def draw_media(field: Field, data: Any, run_dir: Path) -> Media:
     """
     folder = run_dir / FOLDER
     mesh = field.reconstruct(_RESOLUTION)
-    folder.mkdir(exist_ok=True)
+    make_folder(folder)
     noisy, reference = noisy_points(data), getattr(data, "reference", None)
     truth = (reference.vertices, reference.faces) if reference else (None, None)
     subject = Subject(run_dir.name, "units of the data", noisy, *truth, up=up_axis(noisy))

@@ -57,6 +57,34 @@ def test_damaged_files_are_told(tmp_path, name, content):
     assert scene is not None and (picture is None) == (name == "level_sets.png")
 
 
+def test_any_bit_may_be_wrong(tmp_path):
+    write_media(tmp_path / "media")
+    random = np.random.default_rng(0)
+    for name in ("points.npz", "mesh.glb"):
+        path, shown = tmp_path / "media" / name, 0
+        whole = path.read_bytes()
+        for _ in range(200):
+            damaged = bytearray(whole)
+            damaged[random.integers(len(whole))] ^= 1 << int(random.integers(8))
+            path.write_bytes(damaged)
+            problems = []
+            assert read_scene(tmp_path / "media", problems) is not None and len(problems) <= 1
+            shown += not problems
+        assert 0 < shown < 200
+        path.write_bytes(whole)
+
+
+def test_faces_of_vertices_that_are_not_there_are_told(tmp_path):
+    mesh = trimesh.creation.icosphere(subdivisions=5)
+    mesh.export(tmp_path / "mesh.glb")
+    damaged = bytearray((tmp_path / "mesh.glb").read_bytes())
+    faces = np.asarray(mesh.faces, "<u4").tobytes()
+    damaged[damaged.index(faces[:60]) + 3] = 1  # of the first index
+    (tmp_path / "mesh.glb").write_bytes(damaged)
+    problems = []
+    assert read_scene(tmp_path, problems) is None and "vertices that are not there" in problems[0]
+
+
 @pytest.mark.parametrize(
     "arrays",
     [{"points": np.zeros((4, 2))}, {"points": np.full((4, 3), np.nan)}, {"other": np.zeros(3)},

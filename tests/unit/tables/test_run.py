@@ -11,6 +11,7 @@ import pytest
 import table_jobs
 
 from n2n.tables import run as module
+from n2n.tables.shared import FAILED, MINE, Share, now
 from n2n.tables.plan import Job, Plan
 from n2n.tables.spec import Fit, Profile
 from n2n.tables.store import Store
@@ -126,5 +127,11 @@ def test_a_failed_repetition_keeps_the_numbers(plan, tmp_path):
     wanted, store = plan("fails"), Store(tmp_path)
     good = {"status": "done", "results": {}, "cost": {}, "made": {"sources": "older"}}
     store.write(next(iter(wanted.jobs)), good)
-    assert len(module.run(wanted, store, 1, again=True)) == 1
-    assert store.read(next(iter(wanted.jobs))) == good
+    (job,), since = wanted.jobs.values(), now(store) - 1
+    assert module.run(wanted, store, 1, again=True, since=since) == [(job, "it is broken")]
+    assert store.read(job.fit) == {**good, "failed_again": "it is broken"}
+    # Who works on the same plan does not try it too; who starts later does.
+    with Share(wanted, store, again=True, since=since) as share:
+        assert share.take(job) == (FAILED, "it is broken")
+    with Share(wanted, store, again=True, since=now(store) + 1) as share:
+        assert share.take(job) == (MINE, "")
