@@ -26,7 +26,7 @@ def read_picture(folder: Path, problems: list[str]) -> str | None:
     try:
         with Image.open(path) as image:
             small = image.convert("RGB")
-        small.thumbnail((_PICTURE_SIDE, _PICTURE_SIDE))
+        small.thumbnail((_PICTURE_SIDE, _PICTURE_SIDE), Image.Resampling.HAMMING)
         packed = io.BytesIO()
         small.save(packed, "WEBP", quality=_QUALITY, method=_EFFORT)
     except (OSError, ValueError, SyntaxError, UnidentifiedImageError, Image.DecompressionBombError) as error:
