@@ -17,6 +17,7 @@ from benchmarks.tables import number, span, table
 from benchmarks.timing import ratio, spread
 from n2n.datamodules.observations import ObservationsDataModule
 from n2n.fitting.module import FitModule
+from n2n.fitting.revision import Revision
 
 TITLE = "Lightning"
 TRIAL = {"points": 300, "rounds": 2, "overrides": ["iterations=8", "plan_reuse=4"]}
@@ -95,11 +96,11 @@ def _both(
     trainer: L.Trainer, module: FitModule, data: ObservationsDataModule, stamps: list[float], bare_first: bool
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Run the same fit under Lightning and without."""
-    bare = copy.deepcopy(module)
+    bare, revision = copy.deepcopy(module), copy.copy(next(c for c in trainer.callbacks if isinstance(c, Revision)))
     if bare_first:
-        loop = _bare_loop(bare, data)
+        loop = _bare_loop(bare, data, revision)
         return _lightning(trainer, module, data, stamps), loop
-    return _lightning(trainer, module, data, stamps), _bare_loop(bare, data)
+    return _lightning(trainer, module, data, stamps), _bare_loop(bare, data, revision)
 
 
 def _lightning(
@@ -129,10 +130,11 @@ class _Bare:
         pass
 
 
-def _bare_loop(module: FitModule, data: ObservationsDataModule) -> dict[str, Any]:
+def _bare_loop(module: FitModule, data: ObservationsDataModule, revision: Revision) -> dict[str, Any]:
     stamps, start = [], time.perf_counter()
     bare, draws = _Bare(module), iter(data.train_dataloader().dataset)
     for bare.global_step in range(0, module.iterations, module.plan_reuse):
+        revision.on_train_batch_start(None, bare)
         FitModule.training_step(bare, next(draws), 0)
         stamps.append(time.perf_counter())
     seconds = time.perf_counter() - start
