@@ -1,5 +1,7 @@
 """Points that belong to no surface: repeated ones, ones far from all others, and outliers around the surface."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
@@ -46,11 +48,12 @@ def outliers(points: NDArray[np.float64]) -> NDArray[np.bool_]:
     new = np.ones(len(points), bool)
     new[1:] = (points[order[1:]] != points[order[:-1]]).any(axis=1)
     distinct = points[order[new]]
-    kept = np.arange(len(distinct))
+    kept, before = np.arange(len(distinct)), None
     for _ in range(_ROUNDS):
-        found = _most_evident(distinct[kept])
+        found, before = _most_evident(distinct[kept], before)
         if not found.any():
             break
+        before = _Before(before.reach[~found], before.ranks, distinct[kept[found]])
         kept = kept[~found]
     verdict = np.ones(len(distinct), bool)
     verdict[kept] = False
@@ -59,29 +62,51 @@ def outliers(points: NDArray[np.float64]) -> NDArray[np.bool_]:
     return result
 
 
-def _most_evident(points: NDArray[np.float64]) -> NDArray[np.bool_]:
+@dataclass
+class _Before:
+    """What the last round knows: distances (n, r) of points to neighbours of these ranks, and who left since."""
+
+    reach: NDArray[np.float64]
+    ranks: list[int]
+    gone: NDArray[np.float64]
+
+
+def _most_evident(points: NDArray[np.float64], before: _Before | None) -> tuple[NDArray[np.bool_], _Before]:
     """Tell which points are alone in the cloud, (n,); where none is, which are outliers among their neighbours."""
     found = np.zeros(len(points), bool)
-    if len(points) <= _NEIGHBOUR:
-        return found
     tree = cKDTree(points)
-    reaches = [min(k, len(points) - 1, max(len(points) // 4, _NEIGHBOUR)) for k in (_NEIGHBOUR, *_REACHES)]
-    reach = tree.query(points, [k + 1 for k in reaches], workers=-1)[0]
-    found = reach[:, 0] > _LONELY * np.median(reach[:, 0])
+    ranks = [min(k, len(points) - 1, max(len(points) // 4, _NEIGHBOUR)) for k in (_NEIGHBOUR, *_REACHES)]
+    now = _Before(_reach(tree, ranks, before), ranks, points[:0])
+    if len(points) <= _NEIGHBOUR:
+        return found, now
+    found = now.reach[:, 0] > _LONELY * np.median(now.reach[:, 0])
     if found.any() or len(points) < _FEWEST:
-        return found
-    reach = reach[:, 1:]
+        return found, now
+    reach = now.reach[:, 1:]
     usual = _usual(points, reach)
     suspected = (reach > _SUSPECT * usual).any(axis=1)
     suspects = np.flatnonzero(suspected)
     if not len(suspects) or len(points) - len(suspects) < 2 * _PATCH:
-        return found
+        return found, now
     height, flatness, distance = _against_patch(tree, points[suspects], skip=1)
     even = distance[:, -1] < _EVEN * distance[:, _PATCH // 4 - 1]
     suspects = suspects[~((height < _ON) & (flatness < _FLAT) & even)]
     height, _, distance = _against_patch(cKDTree(points[~suspected]), points[suspects])
     found[suspects[(distance[:, 0] > _AWAY * usual[suspects, -1]) | (height > _OFF)]] = True
-    return found
+    return found, now
+
+
+def _reach(tree: cKDTree, ranks: list[int], before: _Before | None) -> NDArray[np.float64]:
+    """Return the distances (n, r) of all points to their neighbours of these ranks.
+
+    They are searched for anew only where somebody nearer than the farthest of them is gone.
+    """
+    if before is None or before.ranks != ranks:
+        return tree.query(tree.data, [k + 1 for k in ranks], workers=-1)[0]
+    reach = before.reach
+    lost = cKDTree(before.gone).query(tree.data, workers=-1)[0] <= reach[:, -1]
+    reach[lost] = tree.query(tree.data[lost], [k + 1 for k in ranks], workers=-1)[0]
+    return reach
 
 
 def _usual(points: NDArray[np.float64], reach: NDArray[np.float64]) -> NDArray[np.float64]:
