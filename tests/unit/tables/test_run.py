@@ -11,8 +11,8 @@ import pytest
 import table_jobs
 
 from n2n.tables import run as module
-from n2n.tables.shared import FAILED, MINE, Share, now
 from n2n.tables.plan import Job, Plan
+from n2n.tables.shared import FAILED, MINE, Share, now
 from n2n.tables.spec import Fit, Profile
 from n2n.tables.store import Store
 
