@@ -131,7 +131,8 @@ def _resume(sweep, settings: list[str], states: tuple[str, ...]) -> int:
         )
     codes, refused = [], []
     # Paths in the command are those of the folder it was given in.
-    folder = Path(os.path.abspath(sweep.folder))  # `..` would make its parent another folder
+    # Neither `..` nor a link to another disk may make its parent another one.
+    folder = Path(os.path.abspath(sweep.folder))  # noqa: PTH100 - resolve() follows links
     home = folder.parent.parent
     with chdir(home):
         for command in sweep.commands:
