@@ -13,7 +13,7 @@ from torch.utils.data import DataLoader, IterableDataset
 
 from n2n.errors import InputError
 from n2n.geometry.frame import Frame
-from n2n.geometry.outliers import first_of_equal, outliers
+from n2n.geometry.outliers import first_of_equal, outliers_of_each
 
 # Follows the seed, so that no other draw of the fit repeats this one.
 _HELD_OUT = (0, 2)
@@ -63,7 +63,7 @@ class ObservationsDataModule(L.LightningDataModule):
                     f"num_observations={num_observations}, but only {len(used)} given; add observations or lower it"
                 )
             # Each by itself: next to a denser or cleaner observation all points of another would look like outliers.
-            stray = [outliers(cloud) for cloud in used]
+            stray = outliers_of_each(used)
             kept = [cloud[first_of_equal(cloud) & ~out] for cloud, out in zip(used, stray, strict=True)]
             self.left_out.append(sum(map(len, used)) - sum(map(len, kept)))
             self.outliers.append(int(sum(out.sum() for out in stray)))

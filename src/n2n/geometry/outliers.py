@@ -1,5 +1,9 @@
 """Points that belong to no surface: repeated ones, ones far from all others, and outliers around the surface."""
 
+import functools
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,7 +33,16 @@ def first_of_equal(points: NDArray[np.float64]) -> NDArray[np.bool_]:
     return first
 
 
-def outliers(points: NDArray[np.float64]) -> NDArray[np.bool_]:
+def outliers_of_each(clouds: Sequence[NDArray[np.float64]]) -> list[NDArray[np.bool_]]:
+    """Tell which points of every cloud look like outliers; several clouds at once, where there are several."""
+    if len(clouds) == 1:
+        return [outliers(clouds[0])]
+    # Of many clouds each is small: threads for each of its searches would take longer to start than to work.
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return list(pool.map(functools.partial(outliers, workers=1), clouds))
+
+
+def outliers(points: NDArray[np.float64], workers: int = -1) -> NDArray[np.bool_]:
     """Tell which points look like outliers, (n,); equal points share one verdict.
 
     A point is one if its fourth neighbour is 30 times as far away as is usual in the cloud: a single far point would
@@ -43,6 +56,7 @@ def outliers(points: NDArray[np.float64]) -> NDArray[np.bool_]:
 
     Args:
         points: (n, 3), finite.
+        workers: Threads; -1: all cores.
     """
     order = np.lexsort(points.T)
     new = np.ones(len(points), bool)
@@ -50,7 +64,7 @@ def outliers(points: NDArray[np.float64]) -> NDArray[np.bool_]:
     distinct = points[order[new]]
     kept, before = np.arange(len(distinct)), None
     for _ in range(_ROUNDS):
-        found, before = _most_evident(distinct[kept], before)
+        found, before = _most_evident(distinct[kept], before, workers)
         if not found.any():
             break
         before = _Before(before.reach[~found], before.ranks, distinct[kept[found]])
@@ -71,45 +85,47 @@ class _Before:
     gone: NDArray[np.float64]
 
 
-def _most_evident(points: NDArray[np.float64], before: _Before | None) -> tuple[NDArray[np.bool_], _Before]:
+def _most_evident(
+    points: NDArray[np.float64], before: _Before | None, workers: int
+) -> tuple[NDArray[np.bool_], _Before]:
     """Tell which points are alone in the cloud, (n,); where none is, which are outliers among their neighbours."""
     found = np.zeros(len(points), bool)
     tree = cKDTree(points)
     ranks = [min(k, len(points) - 1, max(len(points) // 4, _NEIGHBOUR)) for k in (_NEIGHBOUR, *_REACHES)]
-    now = _Before(_reach(tree, ranks, before), ranks, points[:0])
+    now = _Before(_reach(tree, ranks, before, workers), ranks, points[:0])
     if len(points) <= _NEIGHBOUR:
         return found, now
     found = now.reach[:, 0] > _LONELY * np.median(now.reach[:, 0])
     if found.any() or len(points) < _FEWEST:
         return found, now
     reach = now.reach[:, 1:]
-    usual = _usual(points, reach)
+    usual = _usual(points, reach, workers)
     suspected = (reach > _SUSPECT * usual).any(axis=1)
     suspects = np.flatnonzero(suspected)
     if not len(suspects) or len(points) - len(suspects) < 2 * _PATCH:
         return found, now
-    height, flatness, distance = _against_patch(tree, points[suspects], skip=1)
+    height, flatness, distance = _against_patch(tree, points[suspects], workers, skip=1)
     even = distance[:, -1] < _EVEN * distance[:, _PATCH // 4 - 1]
     suspects = suspects[~((height < _ON) & (flatness < _FLAT) & even)]
-    height, _, distance = _against_patch(cKDTree(points[~suspected]), points[suspects])
+    height, _, distance = _against_patch(cKDTree(points[~suspected]), points[suspects], workers)
     found[suspects[(distance[:, 0] > _AWAY * usual[suspects, -1]) | (height > _OFF)]] = True
     return found, now
 
 
-def _reach(tree: cKDTree, ranks: list[int], before: _Before | None) -> NDArray[np.float64]:
+def _reach(tree: cKDTree, ranks: list[int], before: _Before | None, workers: int) -> NDArray[np.float64]:
     """Return the distances (n, r) of all points to their neighbours of these ranks.
 
     They are searched for anew only where somebody nearer than the farthest of them is gone.
     """
     if before is None or before.ranks != ranks:
-        return tree.query(tree.data, [k + 1 for k in ranks], workers=-1)[0]
+        return tree.query(tree.data, [k + 1 for k in ranks], workers=workers)[0]
     reach = before.reach
-    lost = cKDTree(before.gone).query(tree.data, workers=-1)[0] <= reach[:, -1]
-    reach[lost] = tree.query(tree.data[lost], [k + 1 for k in ranks], workers=-1)[0]
+    lost = cKDTree(before.gone).query(tree.data, workers=workers)[0] <= reach[:, -1]
+    reach[lost] = tree.query(tree.data[lost], [k + 1 for k in ranks], workers=workers)[0]
     return reach
 
 
-def _usual(points: NDArray[np.float64], reach: NDArray[np.float64]) -> NDArray[np.float64]:
+def _usual(points: NDArray[np.float64], reach: NDArray[np.float64], workers: int) -> NDArray[np.float64]:
     """Return the median reaches around each point, like `reach` (n, r), from some of all points.
 
     The surroundings are wide, so that where outliers are alone with each other the surface nearby still decides. They
@@ -118,13 +134,13 @@ def _usual(points: NDArray[np.float64], reach: NDArray[np.float64]) -> NDArray[n
     count = min(len(points), max(len(points) // _THINNING, 25 * _AROUND))
     some = np.random.default_rng(0).permutation(len(points))[:count]
     tree = cKDTree(points[some])
-    around = tree.query(points[some], min(_AROUND, count), workers=-1)[1]
+    around = tree.query(points[some], min(_AROUND, count), workers=workers)[1]
     usual = np.median(reach[some[around]], axis=1)
-    return usual[tree.query(points, workers=-1)[1]]
+    return usual[tree.query(points, workers=workers)[1]]
 
 
 def _against_patch(
-    tree: cKDTree, queries: NDArray[np.float64], skip: int = 0
+    tree: cKDTree, queries: NDArray[np.float64], workers: int, skip: int = 0
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Fit a plane to the nearest points of the tree, without the first `skip`, for each query.
 
@@ -136,7 +152,7 @@ def _against_patch(
     distance = np.empty((len(queries), _PATCH))
     for start in range(0, len(queries), _CHUNK):
         chunk = slice(start, start + _CHUNK)
-        far, index = tree.query(queries[chunk], _PATCH + skip, workers=-1)
+        far, index = tree.query(queries[chunk], _PATCH + skip, workers=workers)
         patch = tree.data[index[:, skip:]]
         mean = patch.mean(axis=1)
         centred = patch - mean[:, None]

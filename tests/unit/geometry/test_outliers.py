@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from n2n.geometry.outliers import first_of_equal, outliers
+from n2n.geometry import outliers as module
+from n2n.geometry.outliers import first_of_equal, outliers, outliers_of_each
 from n2n.geometry.shapes import scan
 
 
@@ -95,3 +96,21 @@ def test_an_exact_plane_has_no_outliers_however_it_lies():
     flat = np.column_stack([random.random(10_000) ** 3, random.random(10_000), np.zeros(10_000)])
     turn = np.linalg.qr(random.normal(size=(3, 3)))[0]
     assert not outliers(flat @ turn.T).any()
+
+
+def test_several_clouds_are_judged_each_by_itself():
+    stray = np.random.default_rng(2).uniform(-1.5, 1.5, (60, 3))
+    clouds = [sphere(3000, 0.01), np.concatenate([sphere(2000, 0.02, 1), stray]), sphere(50, 0.01)]
+    for found, cloud in zip(outliers_of_each(clouds), clouds, strict=True):
+        assert np.array_equal(found, outliers(cloud))
+    assert outliers_of_each(clouds[1:2])[0].sum() > 20
+
+
+def test_what_is_searched_for_again_is_what_a_search_for_all_would_find(monkeypatch):
+    """Rounds search anew only around those who left."""
+    stray = np.random.default_rng(3).uniform(-1.5, 1.5, (400, 3))
+    cloud = np.concatenate([sphere(4000, 0.03), stray])
+    found = outliers(cloud)
+    of_all = module._reach
+    monkeypatch.setattr(module, "_reach", lambda tree, ranks, before, workers: of_all(tree, ranks, None, workers))
+    assert found.sum() > 100 and np.array_equal(outliers(cloud), found)
