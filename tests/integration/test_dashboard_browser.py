@@ -175,6 +175,7 @@ def test_a_run_has_a_page_and_its_3d_view_turns(opened, browser):
     page.locator("#runs-table").get_by_role("link", name="aaaaaaaa00").click()
     page.wait_for_selector(".run-page")
     assert "regulariser_weight=0.05 seed=0" in page.locator(".run-head").inner_text()
+    page.wait_for_selector(".run-page path.curve")  # drawn once the size of the page is known
     assert page.locator(".run-page path.curve").count() >= 2
     picture = page.locator("img.picture")
     page.wait_for_function("image => image.complete && image.naturalWidth > 0", arg=picture.element_handle())
