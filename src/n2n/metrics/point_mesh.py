@@ -102,7 +102,7 @@ def line_distances(points: Array, directions: Array, vertices: Array, faces: Ind
             break
         total[is_near] += crossing[is_near]
         count[is_near] += 1
-        # Those that are through start once more from where they are, to no effect.
+        # Those that are through start at the reach from now on, where nothing counts any more.
         travelled = np.where(is_near, crossing + beyond, reach)
     total, count = total.reshape(2, -1).sum(axis=0), count.reshape(2, -1).sum(axis=0)
     return np.where(count > 0, total / np.maximum(count, 1), reach)
