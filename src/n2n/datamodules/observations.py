@@ -85,8 +85,7 @@ class ObservationsDataModule(L.LightningDataModule):
         """
         if not share:
             return self, [np.empty((0, 3)) for _ in self.shapes]
-        rest, held_out = copy.copy(self), []
-        rest.shapes = []
+        shapes, held_out = [], []
         for condition, (frame, clouds) in enumerate(zip(self.frames, self.shapes, strict=True)):
             kept, taken = [], []
             for index, cloud in enumerate(clouds):
@@ -95,9 +94,15 @@ class ObservationsDataModule(L.LightningDataModule):
                 chosen[random.choice(len(cloud), max(1, round(share * len(cloud))), replace=False)] = True
                 kept.append(cloud[torch.as_tensor(~chosen)])
                 taken.append(cloud[torch.as_tensor(chosen)].double().numpy())
-            rest.shapes.append(kept)
+            shapes.append(kept)
             held_out.append(frame.to_world(np.concatenate(taken)))
-        return rest, held_out
+        return self.only(shapes), held_out
+
+    def only(self, shapes: list[list[torch.Tensor]]) -> "ObservationsDataModule":
+        """Return these observations of the same shapes, unit coordinates, in the same frames."""
+        other = copy.copy(self)
+        other.shapes = shapes
+        return other
 
     def configure_draws(self, pairs: str, points: int, seed: int, first: int = 0, step: int = 1) -> None:
         """Say how pairs are drawn.

@@ -79,7 +79,7 @@ class Chosen:
         # A fold of f to and fro inside the noise gains a share of noise^2 / area, less the more points are there, and
         # costs 1 / voxel of bending. Cells wider than the noise leave no room for one.
         room = min(1.0, noise / self.voxel) ** 4
-        unfolded = _UNFOLDED * room * noise * self.voxel / self.merged**0.5
+        unfolded = _UNFOLDED * room * noise * self.voxel / self.merged ** (1 / 3)
         smoothness = max(_THIN_PLATE * self.spacing, unfolded) * noise / self.area
         effort = config["effort"]
         return {

@@ -25,7 +25,8 @@ from n2n.fitting.checkpoint import AtomicCheckpointIO, read_state
 from n2n.fitting.held_out import HeldOut
 from n2n.fitting.module import FitModule
 from n2n.fitting.objective import Objective
-from n2n.fitting.prepare import fill_config, prepare
+from n2n.fitting.pilot import is_worth_a_pilot, pilot_of, steps_of, told
+from n2n.fitting.prepare import Shape, fill_config, prepare
 from n2n.fitting.redistance import redistance
 from n2n.fitting.revision import Revision
 from n2n.formats.atomic import make_folder
@@ -89,25 +90,11 @@ def fit(
     data, unseen = data.hold_out(config["validation"], seed)
     shapes = prepare(data, config)
     held_out = [HeldOut.of(*each) for each in zip(unseen, data.frames, shapes, strict=True)]
-    guides = [shape.guide(device, seed) for shape in shapes]
-
-    def build(config: dict[str, Any]) -> Objective:
-        objective = build_objective(config, guides)
-        # A term of weight 0 sees what the others see and leaves the sum as it is, to the last bit.
-        objective.terms = {**{name: (0.0, measure) for name, measure in (watched or {}).items()}, **objective.terms}
-        return objective
-
-    revision = Revision(shapes, partial(fill_config, config, device=device), build)
-    config = revision.config
-    field = build_field(config, len(shapes))
-    for condition, shape in enumerate(shapes):
-        shape.start(field, condition)
-    objective = build(config)
-    optimizer, scheduler = build_optimizer(config)
+    if is_worth_a_pilot(shapes, config):
+        shapes = told(shapes, _pilot(data, shapes, config, device), seed)
+    revision, module = _assemble(shapes, config, device, watched, identity)
+    objective, config = module.objective, revision.config
     iterations, plan_reuse = config["iterations"], config["plan_reuse"]
-    module = FitModule(
-        field, objective, optimizer, scheduler, iterations, plan_reuse, seed, config["average_from"], identity
-    )
     prepared = time.perf_counter()
 
     resume = _resume_from(run_dir)
@@ -124,19 +111,14 @@ def fit(
             )
         )
     with quiet_lightning():
-        trainer = L.Trainer(
-            max_steps=iterations,
-            accelerator="gpu" if device.type == "cuda" else device.type,
-            devices=1,
+        trainer = _trainer(
+            iterations,
+            device,
             logger=logger,
             callbacks=callbacks,
             plugins=[AtomicCheckpointIO()],
             enable_checkpointing=bool(run_dir),
-            enable_progress_bar=False,
-            enable_model_summary=False,
-            inference_mode=False,
             log_every_n_steps=max(1, iterations // plan_reuse // _LOGGED),
-            num_sanity_val_steps=0,
         )
         if first < iterations:
             _train(trainer, module, data, resume)
@@ -151,7 +133,7 @@ def fit(
     if config["redistance"]:
         boxes = [(shape.chosen.lower, shape.chosen.upper) for shape in shapes]
         voxel = config["architecture"].get("voxel") or min(shape.chosen.voxel for shape in shapes)
-        rate = optimizer([torch.nn.Parameter(torch.zeros(1))]).defaults["lr"]
+        rate = build_optimizer(config)[0]([torch.nn.Parameter(torch.zeros(1))]).defaults["lr"]
         redistance(field, boxes, voxel, rate, min(iterations, _REDISTANCE_STEPS), seed)
     return FitResult(
         field=field,
@@ -173,6 +155,61 @@ def fit(
             "seconds_fit": round(time.perf_counter() - prepared, 2),
         },
         held_out=held_out,
+    )
+
+
+def _assemble(
+    shapes: list[Shape],
+    config: dict[str, Any],
+    device: torch.device,
+    watched: Mapping[str, Any] | None = None,
+    identity: str = "",
+) -> tuple[Revision, FitModule]:
+    """Build what is trained, and the callback that holds its filled configuration."""
+    guides = [shape.guide(device, config["seed"]) for shape in shapes]
+
+    def build(config: dict[str, Any]) -> Objective:
+        objective = build_objective(config, guides)
+        # A term of weight 0 sees what the others see and leaves the sum as it is, to the last bit.
+        objective.terms = {**{name: (0.0, measure) for name, measure in (watched or {}).items()}, **objective.terms}
+        return objective
+
+    revision = Revision(shapes, partial(fill_config, config, device=device), build)
+    filled = revision.config
+    field = build_field(filled, len(shapes))
+    for condition, shape in enumerate(shapes):
+        shape.start(field, condition)
+    steps = filled["iterations"], filled["plan_reuse"], filled["seed"], filled["average_from"]
+    return revision, FitModule(field, build(filled), *build_optimizer(filled), *steps, identity)
+
+
+def _pilot(
+    data: ObservationsDataModule, shapes: list[Shape], config: dict[str, Any], device: torch.device
+) -> list[Shape]:
+    """Fit a sample of the observations until its field has been asked how noisy it is."""
+    pilots, config = pilot_of(shapes, config)
+    revision, module = _assemble(pilots, config, device)
+    if revision.asks:
+        data = data.only([shape.observations for shape in pilots])
+        data.configure_draws(config["pairs"], revision.config["batch_size"], config["seed"], 0, module.plan_reuse)
+        with quiet_lightning():
+            trainer = _trainer(
+                steps_of(revision.config), device, callbacks=[revision], logger=False, enable_checkpointing=False
+            )
+            _train(trainer, module, data, None)
+    return revision.shapes
+
+
+def _trainer(steps: int, device: torch.device, **settings: Any) -> L.Trainer:
+    return L.Trainer(
+        max_steps=steps,
+        accelerator="gpu" if device.type == "cuda" else device.type,
+        devices=1,
+        enable_progress_bar=False,
+        enable_model_summary=False,
+        inference_mode=False,
+        num_sanity_val_steps=0,
+        **settings,
     )
 
 

@@ -132,8 +132,9 @@ class Objective:
         def gradient(points: Tensor) -> Tensor:
             return self._evaluate(field, points, condition)[1]
 
-        shift = noise_shift(curvature(gradient, foot, self.target_noise), self.target_noise)
-        return targets - shift[:, None] * functional.normalize(gradient(foot), dim=-1)
+        normals = functional.normalize(gradient(foot), dim=-1)
+        bend = curvature(gradient, foot, normals, self.target_noise)
+        return targets - noise_shift(bend, self.target_noise)[:, None] * normals
 
     def _denoise(self, field: Any, draw: Draw, generator: torch.Generator) -> Tensor | None:
         """Pull many of the targets, if anything will look at them: for a large network that costs more than a step."""

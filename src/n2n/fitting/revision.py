@@ -16,6 +16,7 @@ from n2n.geometry.residual import residual_noise
 _BEGIN = 0.7  # of the measured noise: a field that is too smooth takes thin parts for noise, and goes on doing so
 _SPARSE = 3.0  # noise deviations between points; beyond that a field follows single points, and knows no better
 _WHEN = (0.25, 0.4)  # of the fit; sooner it has not settled, later it could not follow any more
+ASKED_BY = _WHEN[-1]
 _ROOM = 2.0  # noise deviations
 _PROBES = 16_384
 
@@ -23,8 +24,9 @@ _PROBES = 16_384
 class Revision(L.Callback):
     """Begin with less noise than patches saw, ask the field twice how noisy the points are, and go on with its answer.
 
-    Sparse points are not asked about. Of many observations the fit begins with all of the noise: their cells are so
-    fine that a field which is too rough at first perforates thin walls. Nothing is asked if no setting depends on it.
+    Sparse points are not asked about. Of many observations the fit begins with all of the noise that it is given: their
+    cells are so fine that a field which is too rough at first never gets rid of its folds (see `pilot.py`). Nothing is
+    asked if no setting depends on it.
 
     Args:
         shapes: As measured.
@@ -34,6 +36,7 @@ class Revision(L.Callback):
     Attributes:
         shapes: With the noise of now.
         config: The configuration of now.
+        asks: Whether there is anything to ask.
     """
 
     def __init__(
@@ -46,11 +49,11 @@ class Revision(L.Callback):
         self._resumed = False
         measured = [shape.chosen.noise for shape in shapes]
         self._go_on_with(measured)
-        less = [_BEGIN * shape.chosen.noise if _is_dense(shape) else shape.chosen.noise for shape in shapes]
+        less = [_BEGIN * shape.chosen.noise if is_dense(shape) else shape.chosen.noise for shape in shapes]
         matters = fill(_with_noise(shapes, less)) != self.config
-        asks = matters and self.config["iterations"] > self.config["plan_reuse"]
-        self._asked = 0 if asks else len(_WHEN)
-        if asks:
+        self.asks = matters and self.config["iterations"] > self.config["plan_reuse"]
+        self._asked = 0 if self.asks else len(_WHEN)
+        if self.asks:
             is_single = [shape.chosen.observations == 1 for shape in shapes]
             self._go_on_with([a if one else b for a, b, one in zip(less, measured, is_single, strict=True)])
 
@@ -83,7 +86,7 @@ class Revision(L.Callback):
 
     @torch.no_grad()
     def _ask(self, field: SDF, condition: int) -> float:
-        if not _is_dense(self._measured[condition]):
+        if not is_dense(self._measured[condition]):
             return self._measured[condition].chosen.noise
         sample, noise = self.shapes[condition].sample, self.shapes[condition].chosen.noise
         device = next(field.parameters()).device
@@ -94,7 +97,8 @@ class Revision(L.Callback):
         return self._measured[condition].chosen.revised(residual, noise)
 
 
-def _is_dense(shape: Shape) -> bool:
+def is_dense(shape: Shape) -> bool:
+    """Say whether a field could tell the noise of a shape's points."""
     return shape.chosen.spacing < _SPARSE * shape.chosen.noise
 
 

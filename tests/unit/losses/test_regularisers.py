@@ -121,10 +121,10 @@ def test_consistency_target_is_the_distance_to_the_noisy_batch():
     assert ConsistencyTarget()(state).item() == pytest.approx(expected, rel=1e-5)
 
 
-def test_nearest_distance_is_that_of_scipy_over_several_chunks():
+def test_nearest_distance_is_the_least_of_all_pairs():
     points, cloud = _points(100), _points(70, 1)
     expected = torch.as_tensor(cdist(points.numpy(), cloud.numpy()).min(axis=1), dtype=torch.float32)
-    assert torch.allclose(nearest_distance(points, cloud, chunk=33), expected, rtol=1e-4)
+    assert torch.allclose(nearest_distance(points, cloud), expected, rtol=1e-4)
 
 
 def test_nearest_distance_has_finite_slopes_on_the_cloud():
