@@ -9,7 +9,7 @@ from torch.optim.swa_utils import AveragedModel
 
 from n2n.architectures.base import SDF
 from n2n.datamodules.observations import Draw
-from n2n.fitting.objective import Objective
+from n2n.fitting.objective import Objective, diverged
 
 
 class FitModule(L.LightningModule):
@@ -75,5 +75,7 @@ class FitModule(L.LightningModule):
             scheduler.step()
             if self._averaged is not None and iteration >= self._average_from * self.iterations:
                 self._averaged.update_parameters(self.field)
+        if not loss.isfinite():
+            raise diverged()
         # Lightning would count blocks; `step` is its name for the x axis of every logger.
         self.log_dict({"loss": loss.detach(), **parts, "step": float(self.global_step)}, batch_size=1)

@@ -10,6 +10,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from n2n.datamodules.observations import Draw
+from n2n.errors import ConfigError
 from n2n.geometry.curvature import curvature, noise_shift
 from n2n.geometry.point_to_plane import point_to_plane
 from n2n.geometry.pull import pull
@@ -77,6 +78,8 @@ class Objective:
             for _ in range(self.queries.pulls):
                 queries = self._pull(field, queries.reshape(-1, 3), draw.condition).reshape(queries.shape)
             moved = self._pull(field, queries.reshape(-1, 3), draw.condition).reshape(queries.shape)
+            if not moved.isfinite().all():
+                raise diverged()
             plan = self.distance.match(moved, targets)
             denoised = self._denoise(field, draw, generator)
             far = self._far(field, draw, denoised)
@@ -156,6 +159,11 @@ class Objective:
         if guide.far_lids is not None:
             distance = torch.minimum(distance, guide.far_lids)
         return guide.far_points, guide.far_signs * distance
+
+
+def diverged() -> ConfigError:
+    """Return the error for a field that is no longer finite."""
+    return ConfigError("the fit diverged: f is infinite or not a number; lower optimizer.lr")
 
 
 def _some(far: tuple[Tensor, Tensor] | None, generator: torch.Generator) -> tuple[Tensor, Tensor] | None:

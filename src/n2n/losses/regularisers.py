@@ -20,7 +20,9 @@ def nearest_distance(points: Points, cloud: Float[Tensor, "m 3"]) -> Tensor:
 def _nearest(points: Tensor, cloud: Tensor, chunk: int = 4096) -> Tensor:
     """Return the index of the nearest cloud point: by a tree on CPUs, where all pairs of a batch take seconds."""
     if points.device.type == "cpu":
-        return torch.as_tensor(cKDTree(cloud.numpy()).query(points.numpy(), workers=torch.get_num_threads())[1])
+        # A field that has diverged is reported with its loss, not here.
+        tree = cKDTree(cloud.nan_to_num().numpy())
+        return torch.as_tensor(tree.query(points.nan_to_num().numpy(), workers=torch.get_num_threads())[1])
     return torch.cat([torch.cdist(part, cloud).argmin(dim=1) for part in points.split(chunk)])
 
 

@@ -231,3 +231,13 @@ def test_devices_that_do_not_exist_are_refused(monkeypatch):
     assert pick_device("auto") == torch.device("cpu")
     with pytest.raises(ConfigError, match="use device=cpu"):
         pick_device("cuda")
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [["plan_reuse=1"], ["plan_reuse=50"], ["plan_reuse=50", "regulariser=consistency", "regulariser_weight=1"]],
+)
+def test_a_fit_that_diverges_says_so(overrides):
+    settings = [*SHORT, "architecture=mlp", *TINY["mlp"], "optimizer.lr=1e30", *overrides]
+    with pytest.raises(ConfigError, match="diverged.*optimizer.lr"):
+        _fit([scan("sphere", 200, 0.01)], *settings)
