@@ -239,5 +239,5 @@ def test_devices_that_do_not_exist_are_refused(monkeypatch):
 )
 def test_a_fit_that_diverges_says_so(overrides):
     settings = [*SHORT, "architecture=mlp", *TINY["mlp"], "optimizer.lr=1e30", *overrides]
-    with pytest.raises(ConfigError, match="diverged.*optimizer.lr"):
+    with pytest.raises(ConfigError, match=r"diverged.*optimizer\.lr"):
         _fit([scan("sphere", 200, 0.01)], *settings)
