@@ -9,10 +9,10 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from n2n.architectures.base import SDF
+from n2n.architectures.bending import Cells, compliant, hessian
 from n2n.shapes import Index, Points, Values
 
 _MAX_CELLS = 256**3
-_ADAPT_POWER, _ADAPT_FLOOR = 0.5, 0.2
 
 
 class Grid(SDF):
@@ -55,7 +55,6 @@ class Grid(SDF):
         self.register_buffer("lower", middle - size / 2)
         self.register_buffer("size", size)
         self.register_buffer("band", torch.zeros(num_conditions, *self.shape))
-        self.register_buffer("_rigidity", torch.zeros(num_conditions, *self.shape), persistent=False)
         self.levels = nn.ParameterList(
             nn.Parameter(torch.zeros(num_conditions, 1, *(c * 2**level for c in coarse))) for level in range(levels)
         )
@@ -64,6 +63,8 @@ class Grid(SDF):
         with torch.no_grad():
             self.levels[0] += nodes.norm(dim=-1) - radius * float(size.norm()) / 2
         self._shared: Tensor | None = None
+        self._least: Tensor | None = None
+        self._stiffness: tuple[Cells, Tensor] | None = None
         self.register_load_state_dict_post_hook(_forget_adaptation)
 
     def coefficients(self) -> Tensor:
@@ -147,25 +148,27 @@ class Grid(SDF):
             rows = mask.movedim(axis, -1)
             wider = functional.max_pool1d(rows.reshape(1, -1, self.shape[axis]), 2 * reach + 1, 1, reach)
             mask = wider.reshape(rows.shape).movedim(-1, axis)
-        self.band[condition] = self._rigidity[condition] = mask
+        self.band[condition] = mask
+        self._least = self._stiffness = None
 
     @torch.no_grad()
     def adapt_roughness(self) -> None:
-        """Let the field bend where it already does: weigh the energy by (e / mean e + 0.2)^-0.5, with a mean of 1.
+        """Let the field bend where and in the direction in which it already does: see `bending.compliant`.
 
-        e is the present ||Hessian f||^2, averaged over 27 cells. One weight for the whole surface would round edges
-        and leave noise on flat parts.
+        One stiffness for the whole surface would round edges and leave noise on flat parts.
         """
-        bending = _mean_of_27(_squared_hessian(self.coefficients()) * self.band)
-        bending /= _mean_of_27(self.band).clamp_min(0.01)  # over the cells of the band alone
-        volume = self.band.sum(dim=(1, 2, 3), keepdim=True).clamp_min(1)
-        mean = (bending * self.band).sum(dim=(1, 2, 3), keepdim=True) / volume
-        weight = (bending / mean.clamp_min(1e-30) + _ADAPT_FLOOR) ** -_ADAPT_POWER * self.band
-        self._rigidity = weight * volume / weight.sum(dim=(1, 2, 3), keepdim=True).clamp_min(1e-30)
+        cells, stiffness = compliant(self.coefficients(), self.band)
+        self._least = self.band.clone()
+        self._least[cells] = torch.linalg.eigvalsh(stiffness)[:, 0].square()
+        self._stiffness = cells, stiffness
 
     def roughness(self, generator: torch.Generator | None = None) -> Tensor:
-        """Return the thin-plate energy: the integral of ||Hessian f||^2 over the band, exact for the grid's sums."""
-        x, band = self.coefficients(), self._rigidity
+        """Return the thin-plate energy: the integral of ||Hessian f||^2 over the band, exact for the grid's sums.
+
+        Where it has been adapted, that of the least stiff direction, and what other directions add to it.
+        """
+        x = self.coefficients()
+        band = self.band if self._least is None else self._least
         energy = x.new_zeros(())
         for axis in (1, 2, 3):
             n = x.shape[axis] - 2
@@ -175,39 +178,21 @@ class Grid(SDF):
             twist = x.diff(dim=first).diff(dim=second)
             inner = band.narrow(first, 0, twist.shape[first]).narrow(second, 0, twist.shape[second])
             energy = energy + 2 * (inner * twist.square()).sum()
+        if self._stiffness is not None:
+            cells, stiffness = self._stiffness
+            bent = hessian(x, cells)
+            stiff = stiffness @ bent
+            more = (stiff * stiff.transpose(-1, -2)).sum((-1, -2)) - band[cells] * bent.square().sum((-1, -2))
+            energy = energy + more.sum()
         # Second differences are h^2 times the derivatives; a cell has volume h^3.
         return energy / self.voxel
 
 
 def _forget_adaptation(grid: Grid, _: object) -> None:
-    """Weigh the energy of a loaded field evenly: the weights follow from the field and are not kept."""
-    grid._rigidity.copy_(grid.band)
+    """Weigh the energy of a loaded field evenly: the stiffness follows from the field and is not kept."""
+    grid._least = grid._stiffness = None
 
 
 def _finer(coefficients: Tensor) -> Tensor:
     """Halve the cells of (b, 1, nx, ny, nz) coefficients; the spline stays the same function."""
     return functional.interpolate(coefficients, scale_factor=2, mode="trilinear", align_corners=False)
-
-
-def _squared_hessian(coefficients: Tensor) -> Tensor:
-    """Return h^4 ||Hessian f||^2 at the centres of the cells, (b, nx, ny, nz), from differences of coefficients."""
-    padded = functional.pad(coefficients[:, None], (1,) * 6, mode="replicate")[:, 0]
-    cells = coefficients.shape[1:]
-
-    def shifted(*shift: int) -> Tensor:
-        return padded[(slice(None), *(slice(1 + s, 1 + s + n) for s, n in zip(shift, cells, strict=True)))]
-
-    total = torch.zeros_like(coefficients)
-    steps = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
-    for a in steps:
-        total += (shifted(*a) - 2 * coefficients + shifted(*(-x for x in a))).square()
-    for a, b in ((0, 1), (0, 2), (1, 2)):
-        both = tuple(x + y for x, y in zip(steps[a], steps[b], strict=True))
-        cross = tuple(x - y for x, y in zip(steps[a], steps[b], strict=True))
-        twist = shifted(*both) + shifted(*(-x for x in both)) - shifted(*cross) - shifted(*(-x for x in cross))
-        total += 2 * (twist / 4).square()
-    return total
-
-
-def _mean_of_27(values: Tensor) -> Tensor:
-    return functional.avg_pool3d(values[:, None], 3, stride=1, padding=1)[:, 0]

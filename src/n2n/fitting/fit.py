@@ -24,7 +24,7 @@ from n2n.fitting.callbacks import ProgressReport, Report
 from n2n.fitting.checkpoint import AtomicCheckpointIO, read_state
 from n2n.fitting.held_out import HeldOut
 from n2n.fitting.module import FitModule
-from n2n.fitting.objective import Objective
+from n2n.fitting.objective import Objective, diverged
 from n2n.fitting.pilot import is_worth_a_pilot, pilot_of, steps_of, told
 from n2n.fitting.prepare import Shape, fill_config, prepare
 from n2n.fitting.redistance import redistance
@@ -90,17 +90,20 @@ def fit(
     data, unseen = data.hold_out(config["validation"], seed)
     shapes = prepare(data, config)
     held_out = [HeldOut.of(*each) for each in zip(unseen, data.frames, shapes, strict=True)]
-    if is_worth_a_pilot(shapes, config):
-        shapes = told(shapes, _pilot(data, shapes, config, device), seed)
-    revision, module = _assemble(shapes, config, device, watched, identity)
+    resume = _resume_from(run_dir)
+    begun = _begun(resume, identity) if resume else None
+    first = begun["global_step"] if begun else 0
+    if run_dir:
+        make_folder(run_dir)
+    # What a pilot said is kept: a resumed fit must have the same cells on any device.
+    noise = begun["pilots"] if begun else [_pilot(data, shape, config, device) for shape in shapes]
+    shapes = [shape if n is None else told(shape, n, seed) for shape, n in zip(shapes, noise, strict=True)]
+    revision, module = _assemble(shapes, config, device, watched)
+    module.kept = {"identity": identity, "pilots": noise}
     objective, config = module.objective, revision.config
     iterations, plan_reuse = config["iterations"], config["plan_reuse"]
     prepared = time.perf_counter()
 
-    resume = _resume_from(run_dir)
-    first = _iteration_of(resume, identity) if resume else 0
-    if run_dir:
-        make_folder(run_dir)
     data.configure_draws(config["pairs"], config["batch_size"], seed, first, plan_reuse)
     callbacks = [revision, *callbacks, *([ProgressReport(report)] if report else [])]
     if run_dir:
@@ -123,13 +126,14 @@ def fit(
         if first < iterations:
             _train(trainer, module, data, resume)
         else:
-            state = read_state(resume)
-            module.load_state_dict(state["state_dict"])
-            if found := state["callbacks"].get(revision.state_key):
+            module.load_state_dict(begun["state_dict"])
+            if found := begun["callbacks"].get(revision.state_key):
                 revision.load_state_dict(found)
     shapes, config = revision.shapes, revision.config
     losses = {"loss", "distance", *objective.terms} - set(watched or ())
     field = module.result.eval().to(device)
+    if not all(weights.isfinite().all() for weights in field.parameters()):
+        raise diverged()
     if config["redistance"]:
         boxes = [(shape.chosen.lower, shape.chosen.upper) for shape in shapes]
         voxel = config["architecture"].get("voxel") or min(shape.chosen.voxel for shape in shapes)
@@ -163,7 +167,6 @@ def _assemble(
     config: dict[str, Any],
     device: torch.device,
     watched: Mapping[str, Any] | None = None,
-    identity: str = "",
 ) -> tuple[Revision, FitModule]:
     """Build what is trained, and the callback that holds its filled configuration."""
     guides = [shape.guide(device, config["seed"]) for shape in shapes]
@@ -180,24 +183,26 @@ def _assemble(
     for condition, shape in enumerate(shapes):
         shape.start(field, condition)
     steps = filled["iterations"], filled["plan_reuse"], filled["seed"], filled["average_from"]
-    return revision, FitModule(field, build(filled), *build_optimizer(filled), *steps, identity)
+    return revision, FitModule(field, build(filled), *build_optimizer(filled), *steps)
 
 
-def _pilot(
-    data: ObservationsDataModule, shapes: list[Shape], config: dict[str, Any], device: torch.device
-) -> list[Shape]:
-    """Fit a sample of the observations until its field has been asked how noisy it is."""
-    pilots, config = pilot_of(shapes, config)
-    revision, module = _assemble(pilots, config, device)
-    if revision.asks:
-        data = data.only([shape.observations for shape in pilots])
-        data.configure_draws(config["pairs"], revision.config["batch_size"], config["seed"], 0, module.plan_reuse)
-        with quiet_lightning():
-            trainer = _trainer(
-                steps_of(revision.config), device, callbacks=[revision], logger=False, enable_checkpointing=False
-            )
-            _train(trainer, module, data, None)
-    return revision.shapes
+def _pilot(data: ObservationsDataModule, shape: Shape, config: dict[str, Any], device: torch.device) -> float | None:
+    """Return the noise that a short fit to a sample of a shape's observations finds; None if that is not worth it."""
+    if not is_worth_a_pilot(shape, config):
+        return None
+    pilot, config = pilot_of(shape, config)
+    revision, module = _assemble([pilot], config, device)
+    if not revision.asks:
+        return None
+    data = data.only([pilot.observations])
+    data.configure_draws(config["pairs"], revision.config["batch_size"], config["seed"], 0, module.plan_reuse)
+    with quiet_lightning():
+        trainer = _trainer(
+            steps_of(revision.config), device, callbacks=[revision], logger=False, enable_checkpointing=False
+        )
+        _train(trainer, module, data, None)
+    revision.on_train_batch_start(trainer, module)
+    return revision.shapes[0].chosen.noise
 
 
 def _trainer(steps: int, device: torch.device, **settings: Any) -> L.Trainer:
@@ -257,11 +262,12 @@ def _resume_from(run_dir: Path | None) -> Path | None:
     return checkpoint if checkpoint and checkpoint.exists() else None
 
 
-def _iteration_of(checkpoint: Path, identity: str) -> int:
+def _begun(checkpoint: Path, identity: str) -> dict[str, Any]:
+    """Read where an interrupted fit stands."""
     state = read_state(checkpoint)
-    if state.get("identity") != identity:
+    if state.get("identity") != identity or "pilots" not in state:
         raise ConfigError(
             f"{checkpoint.parent} holds a fit of other points or with other settings; "
             "choose another folder, or delete this one"
         )
-    return int(state["global_step"])
+    return state

@@ -26,7 +26,9 @@ class FitModule(L.LightningModule):
             draws what an undisturbed one would have drawn.
         average_from: Share of the fit from which on the weights are averaged: every matching sees other points, and the
             last one would count most. 1 for never.
-        identity: Names data and configuration in checkpoints, so that only the same fit is resumed.
+
+    Attributes:
+        kept: What checkpoints hold besides; plain values.
     """
 
     def __init__(
@@ -39,13 +41,13 @@ class FitModule(L.LightningModule):
         plan_reuse: int = 1,
         seed: int = 0,
         average_from: float = 1.0,
-        identity: str = "",
     ) -> None:
         super().__init__()
         self.automatic_optimization = False
         self.field, self.objective = field, objective
         self._optimizer, self._scheduler = optimizer, scheduler
-        self.iterations, self.plan_reuse, self.seed, self.identity = iterations, plan_reuse, seed, identity
+        self.iterations, self.plan_reuse, self.seed = iterations, plan_reuse, seed
+        self.kept: dict[str, Any] = {}
         self._average_from = average_from
         self._averaged = AveragedModel(field) if average_from < 1 else None
 
@@ -59,7 +61,7 @@ class FitModule(L.LightningModule):
         return {"optimizer": optimizer, "lr_scheduler": self._scheduler(optimizer, self.iterations)}
 
     def on_save_checkpoint(self, checkpoint: dict[str, Any]) -> None:
-        checkpoint["identity"] = self.identity
+        checkpoint.update(self.kept)
 
     def training_step(self, draw: Draw, batch_idx: int) -> None:
         first = self.global_step

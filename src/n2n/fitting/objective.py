@@ -78,7 +78,7 @@ class Objective:
             for _ in range(self.queries.pulls):
                 queries = self._pull(field, queries.reshape(-1, 3), draw.condition).reshape(queries.shape)
             moved = self._pull(field, queries.reshape(-1, 3), draw.condition).reshape(queries.shape)
-            if not moved.isfinite().all():
+            if not (moved.isfinite().all() and targets.isfinite().all()):
                 raise diverged()
             plan = self.distance.match(moved, targets)
             denoised = self._denoise(field, draw, generator)

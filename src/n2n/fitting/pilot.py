@@ -17,39 +17,37 @@ from n2n.fitting.revision import ASKED_BY, is_dense
 from n2n.geometry.scaffold import Scaffold
 
 _EFFORT = 0.4
+_ITERATIONS = 100  # a shorter fit than that, if told so, would take less time than its pilot
 _ANOTHER = 0.9  # of the noise that patches saw; a scaffold takes seconds, and does not mind less than that
 
 
-def is_worth_a_pilot(shapes: list[Shape], config: dict[str, Any]) -> bool:
+def is_worth_a_pilot(shape: Shape, config: dict[str, Any]) -> bool:
     """Say whether a pilot may find noise that patches do not see, in a small part of the time of the fit."""
-    many = any(shape.chosen.observations > 1 and is_dense(shape) for shape in shapes)
-    return many and config["architecture"].get("name") == "grid"
+    steps = config["iterations"]
+    long_enough = steps == AUTO or steps >= _ITERATIONS
+    return (
+        shape.chosen.observations > 1 and is_dense(shape) and long_enough and config["architecture"]["name"] == "grid"
+    )
 
 
-def pilot_of(shapes: list[Shape], config: dict[str, Any]) -> tuple[list[Shape], dict[str, Any]]:
-    """Return shapes with their sample as the only observation, and how to fit them."""
-    few = []
-    for shape in shapes:
-        scales = replace(shape.scales, spacing=math.sqrt(shape.scales.area / len(shape.sample)))
-        points = torch.as_tensor(shape.sample, dtype=torch.float32)
-        few.append(replace(shape, observations=[points], scales=scales, chosen=choose(scales, [shape.sample])))
-    return few, {**config, "iterations": AUTO, "plan_reuse": AUTO, "effort": _EFFORT * config["effort"]}
+def pilot_of(shape: Shape, config: dict[str, Any]) -> tuple[Shape, dict[str, Any]]:
+    """Return the shape with its sample as the only observation, and how to fit it."""
+    scales = replace(shape.scales, spacing=math.sqrt(shape.scales.area / len(shape.sample)))
+    points = torch.as_tensor(shape.sample, dtype=torch.float32)
+    pilot = replace(shape, observations=[points], scales=scales, chosen=choose(scales, [shape.sample]))
+    shorter = {"iterations": AUTO, "plan_reuse": AUTO, "effort": _EFFORT * config["effort"], "average_from": 1.0}
+    return pilot, {**config, **shorter}
 
 
 def steps_of(config: dict[str, Any]) -> int:
-    """Return after how many steps of the pilot, whose configuration is filled, the field has been asked."""
-    blocks = math.ceil(ASKED_BY * config["iterations"] / config["plan_reuse"])
-    return blocks * config["plan_reuse"] + 1
+    """Return the step of a pilot, whose configuration is filled, at which its field is asked for the last time."""
+    return math.ceil(ASKED_BY * config["iterations"] / config["plan_reuse"]) * config["plan_reuse"]
 
 
-def told(shapes: list[Shape], pilots: list[Shape], seed: int) -> list[Shape]:
-    """Return the shapes with the noise that their pilots ended with, and scaffolds for it where it is another."""
-    result = []
-    for shape, pilot in zip(shapes, pilots, strict=True):
-        scales = replace(shape.scales, noise=min(shape.scales.noise, pilot.chosen.noise))
-        scaffold = shape.scaffold
-        if scaffold is not None and scales.noise < _ANOTHER * shape.scales.noise:
-            scaffold = Scaffold.build(shape.sample, scales, seed)
-        chosen = choose(scales, [cloud.double().numpy() for cloud in shape.observations])
-        result.append(replace(shape, scales=scales, chosen=chosen, scaffold=scaffold))
-    return result
+def told(shape: Shape, noise: float, seed: int) -> Shape:
+    """Return the shape with another noise than that of its patches, and a scaffold for it where they are far apart."""
+    scales, scaffold = replace(shape.scales, noise=noise), shape.scaffold
+    if scaffold is not None and noise < _ANOTHER * shape.scales.noise:
+        scaffold = Scaffold.build(shape.sample, scales, seed)
+    chosen = choose(scales, [cloud.double().numpy() for cloud in shape.observations])
+    return replace(shape, scales=scales, chosen=chosen, scaffold=scaffold)

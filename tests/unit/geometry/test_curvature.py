@@ -140,7 +140,7 @@ def test_noise_lies_outside_of_spheres_and_cylinders_by_the_shift(dimensions, di
     radius = 1.3
     expected = _mean_shift(dimensions, radius, noise)
     assert expected > 0
-    tolerance = 0.005 if dimensions == 2 else 0.12
+    tolerance = 0.005 if dimensions == 2 else 0.03 if noise <= 0.1 else 0.12
     assert noise_shift(torch.tensor([directions / radius]), noise).item() == pytest.approx(expected, rel=tolerance)
 
 
