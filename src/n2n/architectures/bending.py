@@ -11,8 +11,8 @@ _POWER, _FLOOR = 0.45, 0.2
 Cells = tuple[Tensor, ...]
 
 
-def hessian(values: Tensor, cells: Cells | None = None) -> Tensor:
-    """Return h^2 times the Hessian from central differences, (n, 3, 3) at the given cells or (b, nx, ny, nz, 3, 3).
+def hessian(values: Tensor, cells: Cells) -> Tensor:
+    """Return h^2 times the Hessian at some cells, (n, 3, 3), from central differences; values repeat at the border.
 
     Args:
         values: (b, nx, ny, nz), h apart.
@@ -21,9 +21,7 @@ def hessian(values: Tensor, cells: Cells | None = None) -> Tensor:
     padded = functional.pad(values[:, None], (1,) * 6, mode="replicate")[:, 0]
 
     def at(*shift: int) -> Tensor:
-        if cells is not None:
-            return padded[(cells[0], *(cell + 1 + s for cell, s in zip(cells[1:], shift, strict=True)))]
-        return padded[(slice(None), *(slice(1 + s, 1 + s + n) for s, n in zip(shift, values.shape[1:], strict=True)))]
+        return padded[(cells[0], *(cell + 1 + s for cell, s in zip(cells[1:], shift, strict=True)))]
 
     here, away = at(0, 0, 0), [(at(*step), at(*(-s for s in step))) for step in _STEPS]
     xx, yy, zz = (ahead - 2 * here + behind for ahead, behind in away)
@@ -53,10 +51,15 @@ def compliant(values: Tensor, band: Tensor) -> tuple[Cells, Tensor]:
         Indices of the n cells of the band, and W (n, 3, 3).
     """
     cells = band.nonzero(as_tuple=True)
-    bent = hessian(values)
+    bent = hessian(values, cells)
     squared = bent @ bent
-    near = _mean_of_27(band).clamp_min(0.01)  # over the cells of the band alone
-    entries = [(_mean_of_27(squared[..., i, j] * band) / near)[cells] for i, j in ((0, 0), (1, 1), (2, 2), *_PAIRS)]
+    near = _mean_of_27(band)[cells]
+
+    def around(entry: Tensor) -> Tensor:
+        # Of 27 cells, over those of the band alone.
+        return _mean_of_27(torch.zeros_like(values).index_put(cells, entry))[cells] / near
+
+    entries = [around(squared[:, i, j]) for i, j in ((0, 0), (1, 1), (2, 2), *_PAIRS)]
     mean = _mean_of_each(torch.stack(entries[:3]).sum(dim=0), cells[0]).clamp_min(1e-30)
     size, axes = torch.linalg.eigh(_symmetric(*entries) / mean[:, None, None])
     factor = (size.clamp_min(0) + _FLOOR) ** -_POWER
