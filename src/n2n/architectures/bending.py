@@ -35,7 +35,7 @@ def hessian(values: Tensor, cells: Cells) -> Tensor:
     return _symmetric(xx, yy, zz, *mixed)
 
 
-def compliant(values: Tensor, band: Tensor) -> tuple[Cells, Tensor]:
+def compliant(values: Tensor, band: Tensor) -> tuple[Cells, Tensor, Tensor]:
     """Return the stiffness of every cell of a band against the bending that the values show now.
 
     The energy of a cell with the stiffness W is tr(W H W H), H the Hessian: of bending between directions a and b with
@@ -48,7 +48,7 @@ def compliant(values: Tensor, band: Tensor) -> tuple[Cells, Tensor]:
         band: 1 in the cells that count, 0 elsewhere, same shape.
 
     Returns:
-        Indices of the n cells of the band, and W (n, 3, 3).
+        Indices of the n cells of the band, W (n, 3, 3), and the least w (n,) of each.
     """
     cells = band.nonzero(as_tuple=True)
     bent = hessian(values, cells)
@@ -64,7 +64,7 @@ def compliant(values: Tensor, band: Tensor) -> tuple[Cells, Tensor]:
     size, axes = torch.linalg.eigh(_symmetric(*entries) / mean[:, None, None])
     factor = (size.clamp_min(0) + _FLOOR) ** -_POWER
     factor = factor / _mean_of_each(factor.square().mean(dim=-1), cells[0]).sqrt()[:, None]
-    return cells, (axes * factor[:, None, :]) @ axes.transpose(-1, -2)
+    return cells, (axes * factor[:, None, :]) @ axes.transpose(-1, -2), factor.amin(dim=-1)
 
 
 def _symmetric(xx: Tensor, yy: Tensor, zz: Tensor, xy: Tensor, xz: Tensor, yz: Tensor) -> Tensor:

@@ -157,9 +157,8 @@ class Grid(SDF):
 
         One stiffness for the whole surface would round edges and leave noise on flat parts.
         """
-        cells, stiffness = compliant(self.coefficients(), self.band)
-        self._least = self.band.clone()
-        self._least[cells] = torch.linalg.eigvalsh(stiffness)[:, 0].square()
+        cells, stiffness, least = compliant(self.coefficients(), self.band)
+        self._least = self.band.index_put(cells, least.square())
         self._stiffness = cells, stiffness
 
     def roughness(self, generator: torch.Generator | None = None) -> Tensor:

@@ -24,7 +24,7 @@ from n2n.fitting.callbacks import ProgressReport, Report
 from n2n.fitting.checkpoint import AtomicCheckpointIO, read_state
 from n2n.fitting.held_out import HeldOut
 from n2n.fitting.module import FitModule
-from n2n.fitting.objective import Objective, diverged
+from n2n.fitting.objective import Objective
 from n2n.fitting.pilot import is_worth_a_pilot, pilot_of, steps_of, told
 from n2n.fitting.prepare import Shape, fill_config, prepare
 from n2n.fitting.redistance import redistance
@@ -132,8 +132,6 @@ def fit(
     shapes, config = revision.shapes, revision.config
     losses = {"loss", "distance", *objective.terms} - set(watched or ())
     field = module.result.eval().to(device)
-    if not all(weights.isfinite().all() for weights in field.parameters()):
-        raise diverged()
     if config["redistance"]:
         boxes = [(shape.chosen.lower, shape.chosen.upper) for shape in shapes]
         voxel = config["architecture"].get("voxel") or min(shape.chosen.voxel for shape in shapes)

@@ -77,7 +77,7 @@ class FitModule(L.LightningModule):
             scheduler.step()
             if self._averaged is not None and iteration >= self._average_from * self.iterations:
                 self._averaged.update_parameters(self.field)
-        if not loss.isfinite():
+        if not all(weights.isfinite().all() for weights in self.field.parameters()):
             raise diverged()
         # Lightning would count blocks; `step` is its name for the x axis of every logger.
         self.log_dict({"loss": loss.detach(), **parts, "step": float(self.global_step)}, batch_size=1)

@@ -64,9 +64,6 @@ class Objective:
     @torch.no_grad()
     def begin(self, field: Any, draw: Draw, generator: torch.Generator, progress: float = 0.0) -> Block:
         """Draw queries and targets and match them under the present field (Eq. 4); tell the terms that ask for it."""
-        for _, term in self.terms.values():
-            if hasattr(term, "begin"):
-                term.begin(field, progress)
         candidates = self.queries(draw.source, generator, draw.key)
         # Queries that are the targets themselves would be matched to where they already are.
         tied = draw.same and self.queries.kind != "observation"
@@ -80,6 +77,9 @@ class Objective:
             moved = self._pull(field, queries.reshape(-1, 3), draw.condition).reshape(queries.shape)
             if not (moved.isfinite().all() and targets.isfinite().all()):
                 raise diverged()
+            for _, term in self.terms.values():
+                if hasattr(term, "begin"):
+                    term.begin(field, progress)
             plan = self.distance.match(moved, targets)
             denoised = self._denoise(field, draw, generator)
             far = self._far(field, draw, denoised)

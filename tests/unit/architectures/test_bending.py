@@ -77,14 +77,15 @@ def test_mean_of_27_is_a_box_filter_with_nothing_outside():
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
 def test_stiffness_is_a_power_of_the_squared_hessian_whatever_its_size(seed, scale):
     matrix = _matrix(seed)
-    cells, found = compliant(scale * _quadratic(matrix), _box())
+    cells, found, least = compliant(scale * _quadratic(matrix), _box())
     assert len(cells[0]) == _box().sum()
     assert np.allclose(found, _oracle(matrix), rtol=1e-6)
+    assert np.allclose(least, np.linalg.eigvalsh(_oracle(matrix))[0], rtol=1e-6)
 
 
 def test_a_flat_part_is_stiffer_than_a_bent_one():
     bend = torch.where(_nodes()[..., 0] < 0, 1.0, 3.0)
-    cells, found = compliant((bend * _nodes()[..., 0] ** 2)[None] / 2, _box())
+    cells, found, _ = compliant((bend * _nodes()[..., 0] ** 2)[None] / 2, _box())
     outer = (cells[1] < 6) | (cells[1] > 9)  # away from the seam
     left, right = (found[outer & side] for side in (cells[1] < 8, cells[1] >= 8))
     assert (right[:, 0, 0].max() < left[:, 0, 0].min()) and torch.allclose(left[:, 1, 1], right[:1, 1, 1])
@@ -94,7 +95,7 @@ def test_a_flat_part_is_stiffer_than_a_bent_one():
 def test_an_edge_stays_stiff_along_itself():
     # The distance to the edge between the faces x = 0 and z = 0, which runs along y.
     values = torch.maximum(_nodes()[..., 0], _nodes()[..., 2])[None]
-    cells, found = compliant(values, _box())
+    cells, found, _ = compliant(values, _box())
     x, z = (_nodes()[cells[1:]][:, axis] for axis in (0, 2))
     edge, face = (x - z).abs() < 0.1, (x - z).abs() > 0.4
     across = torch.tensor([1.0, 0, -1], dtype=torch.float64) / 2**0.5
@@ -108,7 +109,7 @@ def test_every_condition_has_its_own_mean():
     first, second = _matrix(0), 100 * _matrix(1)
     band = torch.cat([_box(), 0 * _box(), _box(), _box()])
     flat = torch.zeros_like(_quadratic(first))
-    cells, found = compliant(torch.cat([_quadratic(first), flat, _quadratic(second), flat]), band)
+    cells, found, _ = compliant(torch.cat([_quadratic(first), flat, _quadratic(second), flat]), band)
     assert set(cells[0].tolist()) == {0, 2, 3}
     assert np.allclose(found[cells[0] == 0], _oracle(first), rtol=1e-6)
     assert np.allclose(found[cells[0] == 2], _oracle(second), rtol=1e-6)
@@ -116,5 +117,5 @@ def test_every_condition_has_its_own_mean():
 
 
 def test_without_a_band_there_is_nothing():
-    cells, found = compliant(_quadratic(_matrix(0)), 0 * _box())
+    cells, found, _ = compliant(_quadratic(_matrix(0)), 0 * _box())
     assert not len(cells[0]) and found.shape == (0, 3, 3)

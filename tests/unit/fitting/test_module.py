@@ -1,5 +1,6 @@
 """The weights a fit returns: the last ones, or the mean of those it went through."""
 
+import math
 from itertools import chain
 
 import lightning as L
@@ -9,6 +10,7 @@ from torch.utils.data import DataLoader
 
 import n2n.fitting.schedule as schedule
 from n2n.datamodules.observations import Draw
+from n2n.errors import ConfigError
 from n2n.fitting.fit import quiet_lightning
 from n2n.fitting.module import FitModule
 from n2n.fitting.objective import Block, Objective
@@ -92,6 +94,21 @@ def test_the_result_is_the_mean_after_each_step_from_the_share_on(average_from, 
     # One step more or less would show.
     assert skipped == 0 or not _close(result, _mean(record[skipped - 1 :]))
     assert skipped == 9 or not _close(result, _mean(record[skipped + 1 :]))
+
+
+def test_weights_that_are_not_finite_after_the_last_step_are_an_error(monkeypatch):
+    step = Recorder.step
+
+    def broken(self, closure=None):
+        loss = step(self, closure)
+        if len(self.record) == ITERATIONS:
+            with torch.no_grad():
+                self.param_groups[0]["params"][0].fill_(math.inf)
+        return loss
+
+    monkeypatch.setattr(Recorder, "step", broken)
+    with pytest.raises(ConfigError, match="diverged"):
+        _run(1.0)
 
 
 def test_averaging_leaves_the_fit_itself_alone():
