@@ -1,6 +1,7 @@
 """`n2n`: where commands are dispatched and errors become exit codes."""
 
 import argparse
+import gc
 import signal
 import sys
 from collections.abc import Sequence
@@ -9,6 +10,7 @@ from n2n.cli.arguments import parse
 from n2n.errors import N2NError
 
 DONE, FAILED, BROKEN, INTERRUPTED = 0, 2, 3, 130
+_OBJECTS = 100_000
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -18,7 +20,18 @@ def main(argv: Sequence[str] | None = None) -> int:
         Exit code: 0 done, 1 something is missing (doctor), 2 an error the user can mend, 3 an error of n2n
         itself, 130 interrupted.
     """
-    arguments = list(sys.argv[1:] if argv is None else argv)
+    if argv is not None:
+        return _run(list(argv))
+    # Torch and Lightning bring a million objects, none of them garbage: looking for it took a second while they were
+    # imported, and another one as the process ended.
+    gc.set_threshold(_OBJECTS)
+    try:
+        return _run(sys.argv[1:], is_own_process=True)
+    finally:
+        gc.freeze()
+
+
+def _run(arguments: list[str], is_own_process: bool = False) -> int:
     try:
         return _dispatch(parse(arguments))
     except N2NError as error:
@@ -26,9 +39,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except MemoryError:
         return _fail("not enough memory; use fewer points, a lower --resolution or a smaller batch_size")
     except KeyboardInterrupt as stop:
-        if argv is None:
-            # Our own process, which ends now: pressing Ctrl-C again must not end it in another way. Callers with a
-            # process of their own, which may be in a thread, keep their Ctrl-C.
+        if is_own_process:
+            # It ends now: pressing Ctrl-C again must not end it in another way. Callers with a process of their own,
+            # which may be in a thread, keep their Ctrl-C.
             signal.signal(signal.SIGINT, signal.SIG_IGN)
         return _interrupted(str(stop))
     except BrokenPipeError:
