@@ -306,17 +306,18 @@ def test_interrupting_leaves_nothing(n2n, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == [tmp_path / "scan.xyz"]
 
 
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
 @pytest.mark.skipif(sys.platform == "win32", reason="sends signals")
-def test_an_impatient_second_interruption_changes_nothing(tmp_path):
-    program = """
+def test_an_impatient_second_interruption_changes_nothing(name, tmp_path):
+    program = f"""
 import os, signal, sys
 from n2n.cli import main as module
 
 def wait(_):
-    os.kill(os.getpid(), signal.SIGINT)
+    os.kill(os.getpid(), signal.{name})
 
 def tell(advice=""):
-    os.kill(os.getpid(), signal.SIGINT)
+    os.kill(os.getpid(), signal.{name})
     print("told")
     return 130
 

@@ -173,16 +173,22 @@ def alive(session):
     return found
 
 
+def press_ctrl_c(process):
+    os.killpg(process.pid, signal.SIGINT)
+
+
+@pytest.mark.parametrize("stop", [press_ctrl_c, subprocess.Popen.terminate])
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc to look for processes")
-def test_ctrl_c_ends_all_workers_and_resume_goes_on(capsys):
+def test_an_interruption_ends_all_workers_and_resume_goes_on(stop):
     process = begin("fit", "-m", "sweep=x", "seed=0,1,2,3", "datamodule.points=400", "hydra.launcher.n_jobs=2", *FIT)
     end = time.monotonic() + 300
     while time.monotonic() < end and not any(Path("sweeps").glob("x/runs/*/status.json")):
         time.sleep(0.05)
-    os.killpg(process.pid, signal.SIGINT)
+    stop(process)
     said = process.communicate(timeout=60)[1]
     assert process.returncode == 130
-    assert "interrupted; `n2n sweep resume x` goes on" in said and "Traceback" not in said
+    assert said.splitlines()[-1] == "n2n: interrupted; `n2n sweep resume x` goes on where it stopped"
+    assert "Traceback" not in said and "Warning" not in said
     end = time.monotonic() + 10
     while alive(process.pid) and time.monotonic() < end:
         time.sleep(0.1)

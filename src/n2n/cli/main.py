@@ -18,13 +18,14 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Returns:
         Exit code: 0 done, 1 something is missing (doctor), 2 an error the user can mend, 3 an error of n2n
-        itself, 130 interrupted.
+        itself, 130 interrupted by Ctrl-C or SIGTERM.
     """
     if argv is not None:
         return _run(list(argv))
     # Torch and Lightning bring a million objects, none of them garbage: looking for it took a second while they were
     # imported, and another one as the process ended.
     gc.set_threshold(_OBJECTS)
+    signal.signal(signal.SIGTERM, _stop)
     try:
         return _run(sys.argv[1:], is_own_process=True)
     finally:
@@ -43,6 +44,7 @@ def _run(arguments: list[str], is_own_process: bool = False) -> int:
             # It ends now: pressing Ctrl-C again must not end it in another way. Callers with a process of their own,
             # which may be in a thread, keep their Ctrl-C.
             signal.signal(signal.SIGINT, signal.SIG_IGN)
+            signal.signal(signal.SIGTERM, signal.SIG_IGN)
         return _interrupted(str(stop))
     except BrokenPipeError:
         # The reader of our output has gone (n2n list | head); the interpreter would complain once more at exit.
@@ -75,6 +77,11 @@ def _dispatch(options: argparse.Namespace) -> int:
     from n2n.cli.work import run_work
 
     return run_work(options)
+
+
+def _stop(*_: object) -> None:
+    """End like Ctrl-C, which leaves nothing half-written: a container or a scheduler asks by SIGTERM."""
+    raise KeyboardInterrupt
 
 
 def _fail(message: str) -> int:
