@@ -3,18 +3,16 @@
 import os
 import shlex
 from collections.abc import Sequence
-from threading import Thread
-from typing import Any
 
 from n2n.cli.console import say
-from n2n.cli.sweep_job import SweepJob, prepare
+from n2n.cli.sweep_job import SweepJob
 from n2n.cli.sweep_progress import watching
 from n2n.compose import config_hash
 from n2n.errors import ConfigError
 from n2n.sweeps.command import check_jobs, is_about_launcher, take_name
 from n2n.sweeps.data import Fingerprints
 from n2n.sweeps.grid import Grid, Job, make_grid
-from n2n.sweeps.launch import end_workers, is_joblib, launch, optimise, set_processes, share_cores, start_workers
+from n2n.sweeps.launch import is_joblib, launch, optimise, set_processes
 from n2n.sweeps.launchers import check_installed, told_threads
 from n2n.sweeps.store import STATES, SWEEPS, Sweep
 from n2n.sweeps.watch import Watch
@@ -45,33 +43,22 @@ def run_multirun(
     """
     name, settings = take_name(settings)
     name = name or config_hash({"command": sorted(text for text in settings if not is_about_launcher(text))})
-    threads, folder = told_threads(), resumed.folder if resumed else SWEEPS / name
-    started: list[Thread] = []
-
-    def start(master: Any, runs: int) -> None:
-        # Where the folder exists, runs may be done and no process be needed.
-        if is_joblib(master) and not folder.exists():
-            started.append(start_workers(master, share_cores(master, _cores(), runs)[0], prepare))
-
-    grid = make_grid(settings, flags, folder, start)
+    grid = make_grid(settings, flags, resumed.folder if resumed else SWEEPS / name)
     if grid.jobs is None:
         check_jobs(settings, flags)
     check_installed(grid.master.hydra)
+    threads = told_threads()
     sweep = _same(resumed, grid) if resumed else _plan(name, settings, flags, grid)
     jobs = None if grid.jobs is None else _wanted(sweep, grid.jobs, states)
     if jobs == []:
         return _report(grid, sweep)
     task = _task(grid, sweep, len(jobs) if jobs else None, threads)
-    for thread in started:
-        thread.join()
     try:
         with watching(Watch(sweep, [job.hash for job in jobs] if jobs else None)):
             if jobs:
                 launch(grid, sweep, jobs, task)
             else:
                 optimise(grid, task)
-        if is_joblib(grid.master):
-            end_workers()
     except KeyboardInterrupt as stop:
         raise KeyboardInterrupt(f"`n2n sweep resume {shlex.quote(name)}` goes on where it stopped") from stop
     return _report(grid, sweep)
@@ -116,18 +103,14 @@ def _wanted(sweep: Sweep, jobs: list[Job], states: Sequence[str]) -> list[Job]:
 def _task(grid: Grid, sweep: Sweep, runs: int | None, told: int | None) -> SweepJob:
     """Return what workers are to do, each with its share of this machine."""
     threads, parent = None, None
-    if is_joblib(grid.master):
-        processes, share = share_cores(grid.master, _cores(), runs or _cores())
-        set_processes(grid.master, processes)
+    if is_joblib(grid):
+        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        processes, share = set_processes(grid, cores, runs or cores)
         # Whoever says how many threads is obeyed.
         threads, parent = told or share, os.getpid()
         say(f"sweep: {processes} at a time, threads of each: {threads}")
     planned = None if grid.jobs is None else {" ".join(job.settings): job.hash for job in grid.jobs}
     return SweepJob(sweep.folder.absolute(), tuple(grid.axes), planned, threads, parent)
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _report(grid: Grid, sweep: Sweep) -> int:

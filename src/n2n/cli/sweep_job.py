@@ -41,14 +41,9 @@ class SweepJob:
         """Fit; return the run's score, which an optimising sweeper goes by."""
         from hydra.core.hydra_config import HydraConfig
 
-        if self.parent and os.getpid() != self.parent:
-            prepare()
+        self._settle()
         from n2n.cli.job import fit_job
 
-        if self.threads:
-            import torch
-
-            torch.set_num_threads(self.threads)
         config = validate(composed)
         settings = varied(HydraConfig.get().overrides.task, self.axes)
         name = run_hash(config)
@@ -71,21 +66,31 @@ class SweepJob:
             state = attempt(folder, settings, lambda: fingerprint(data()), fit)
         return score(folder) if state == "done" else None
 
+    def _settle(self) -> None:
+        """Take the share of the cores; in a process of its own, leave Ctrl-C to the parent and end with it."""
+        if self.parent and os.getpid() != self.parent and not any(t.name == _FOLLOWER for t in threading.enumerate()):
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+            threading.Thread(target=_follow, args=(os.getppid(),), name=_FOLLOWER, daemon=True).start()
+            _import_once()
+        if self.threads:
+            import torch
+
+            torch.set_num_threads(self.threads)
+
+
+def _import_once() -> None:
+    """Import what runs need without looking for garbage, of which there is none, and never look through it again.
+
+    That took a third of the time of the imports, and a quarter of a second after each run, when joblib looks.
+    """
+    gc.disable()
+    import n2n.cli.job  # noqa: F401
+
+    gc.freeze()
+    gc.enable()
+
 
 _FOLLOWER = "n2n-follow-parent"
-
-
-def prepare() -> None:
-    """Make a process of joblib ready for runs: it leaves Ctrl-C to its parent, and ends with it."""
-    if any(thread.name == _FOLLOWER for thread in threading.enumerate()):
-        return
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_follow, args=(os.getppid(),), name=_FOLLOWER, daemon=True).start()
-    gc.disable()
-    import n2n.cli.job  # noqa: F401 - takes seconds; a third more with a search for garbage, of which there is none
-
-    gc.enable()
-    gc.freeze()  # joblib collects garbage after each run: that took a quarter of a second, for what was imported
 
 
 def _follow(parent: int) -> None:

@@ -1,7 +1,7 @@
 """From a swept command line to its runs: the only module of a sweep that composes."""
 
 from argparse import Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -62,20 +62,13 @@ class Grid:
     jobs: list[Job] | None
 
 
-def make_grid(
-    settings: Sequence[str],
-    flags: Sequence[str],
-    folder: Path,
-    meanwhile: Callable[[Any, int], None] = lambda master, runs: None,
-) -> Grid:
+def make_grid(settings: Sequence[str], flags: Sequence[str], folder: Path) -> Grid:
     """Compose all runs of a command line.
 
     Args:
         settings: `key=value`, some with several values.
         flags: Hydra's own, e.g. --config-dir.
         folder: Of the sweep.
-        meanwhile: Called with the master configuration and the number of runs once that is known; the rest takes a
-            tenth of a second a run.
 
     Raises:
         ConfigError: The first thing that is wrong.
@@ -104,7 +97,6 @@ def make_grid(
             expanded = BasicSweeper.split_arguments(given, None)[0]
             if not any(text.startswith("hydra.searchpath=") for text in settings):
                 check_choices(dict.fromkeys(chain(*expanded)), hydra.config_loader)
-            meanwhile(master, len(expanded))
             jobs = _unique([_job(hydra.config_loader, master, one, axes) for one in expanded])
     except ConfigError:
         raise

@@ -1,18 +1,15 @@
 """Runs handed to one of Hydra's launchers, past workers that die."""
 
-import threading
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from typing import Any
 
 from hydra._internal.callbacks import Callbacks
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.plugins import Plugins
 from hydra.types import HydraContext
-from joblib import Parallel, delayed
-from joblib.externals.loky import get_reusable_executor
 from omegaconf import OmegaConf, open_dict, read_write
 
 from n2n.errors import ConfigError, N2NError
@@ -94,61 +91,28 @@ def optimise(grid: Grid, task: Task) -> None:
                 raise ConfigError(f"workers were killed {_TRIES + 1} times; most likely for want of memory") from None
 
 
-def is_joblib(master: Any) -> bool:
-    """Return whether the launcher of a composed configuration is the one for processes on this machine."""
-    return str(master.hydra.launcher._target_).endswith(_JOBLIB)
+def is_joblib(grid: Grid) -> bool:
+    """Return whether the launcher is the one for processes on this machine."""
+    return str(grid.master.hydra.launcher._target_).endswith(_JOBLIB)
 
 
-def share_cores(master: Any, cores: int, runs: int) -> tuple[int, int]:
-    """Return how many processes the launcher joblib is to have, and threads for each.
+def set_processes(grid: Grid, cores: int, runs: int) -> tuple[int, int]:
+    """Choose processes, and threads for each, for the launcher joblib.
 
     Args:
-        master: The composed configuration; `hydra.launcher.n_jobs` that the user gave counts.
+        grid: Its configuration is changed; `hydra.launcher.n_jobs` that the user gave is kept.
         cores: To be shared.
         runs: There are.
-    """
-    asked = int(master.hydra.launcher.n_jobs)
-    processes = asked if asked > 0 else max(1, min(cores, runs))
-    return processes, max(1, cores // processes)
-
-
-def set_processes(master: Any, processes: int) -> None:
-    """Tell the launcher joblib, in the composed configuration."""
-    launcher = master.hydra.launcher
-    with read_write(master), open_dict(master):
-        launcher.n_jobs = processes
-        launcher.batch_size = "1"  # joblib would put short runs together, and one failure would take all of them
-
-
-def start_workers(master: Any, processes: int, work: Callable[[], object]) -> threading.Thread:
-    """Start joblib's processes, and do something in each; returns at once.
-
-    joblib keeps its processes, and the launcher finds them. So they import what runs need while others compose.
-
-    Args:
-        master: The composed configuration.
-        processes: That the launcher will be told to have.
-        work: Called in each process; a function of a module.
 
     Returns:
-        What is joined before the launcher starts.
+        Processes; threads of each.
     """
-    options = {key: value for key, value in master.hydra.launcher.items() if key != "_target_"}
-    options |= {"n_jobs": processes, "backend": "loky", "batch_size": 1}  # as the launcher will have them
-
-    def start() -> None:
-        # A process that cannot start fails the launch as well, which knows what to do about it.
-        with suppress(Exception):
-            Parallel(**options)([delayed(work)()] * processes)
-
-    thread = threading.Thread(target=start, name="n2n-start-workers", daemon=True)
-    thread.start()
-    return thread
-
-
-def end_workers() -> None:
-    """End joblib's processes, which have nothing to do; joblib itself would take two seconds to."""
-    get_reusable_executor(reuse=True).shutdown(kill_workers=True)
+    launcher = grid.master.hydra.launcher
+    processes = int(launcher.n_jobs) if int(launcher.n_jobs) > 0 else max(1, min(cores, runs))
+    with read_write(grid.master), open_dict(grid.master):
+        launcher.n_jobs = processes
+        launcher.batch_size = "1"  # joblib would put short runs together, and one failure would take all of them
+    return processes, max(1, cores // processes)
 
 
 def _launch(grid: Grid, jobs: Sequence[Job], task: Task) -> None:

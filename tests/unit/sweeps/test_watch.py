@@ -4,7 +4,8 @@ import pytest
 from omegaconf import OmegaConf
 
 from n2n.cli.sweep_progress import line
-from n2n.sweeps.launch import is_joblib, set_processes, share_cores
+from n2n.sweeps.grid import Grid
+from n2n.sweeps.launch import is_joblib, set_processes
 from n2n.sweeps.status import FIELD_FILE, Status
 from n2n.sweeps.store import Sweep
 from n2n.sweeps.watch import Watch
@@ -60,9 +61,8 @@ def test_data_that_changed_are_news_again(sweep):
 def test_cores_are_shared(asked, cores, runs, processes, threads):
     target = "hydra_plugins.hydra_joblib_launcher.joblib_launcher.JoblibLauncher"
     launcher = {"_target_": target, "n_jobs": asked, "batch_size": "auto"}
-    master = OmegaConf.create({"hydra": {"launcher": launcher}})
-    OmegaConf.set_readonly(master, True)
-    assert is_joblib(master)
-    assert share_cores(master, cores, runs) == (processes, threads)
-    set_processes(master, processes)
-    assert (master.hydra.launcher.n_jobs, master.hydra.launcher.batch_size) == (processes, "1")
+    grid = Grid(None, OmegaConf.create({"hydra": {"launcher": launcher}}), {}, [], None)
+    OmegaConf.set_readonly(grid.master, True)
+    assert is_joblib(grid)
+    assert set_processes(grid, cores, runs) == (processes, threads)
+    assert (grid.master.hydra.launcher.n_jobs, grid.master.hydra.launcher.batch_size) == (processes, "1")
