@@ -9,6 +9,7 @@ from typing import Any
 from n2n.errors import OutputError
 from n2n.formats.atomic import make_folder
 from n2n.sweeps.claims import claim, is_held
+from n2n.tables.methods import not_installed
 from n2n.tables.plan import Job, Plan
 from n2n.tables.spec import Fit
 from n2n.tables.store import Store, sources
@@ -70,8 +71,12 @@ class Share:
 
 
 def open_jobs(plan: Plan, store: Store, again: bool = False) -> list[Job]:
-    """Return what is to be done at present, by whomsoever; `again`: also what was done by other sources."""
-    return plan.open(store) + (plan.stale(store) if again else [])
+    """Return what is to be done at present, by whomsoever; `again`: also what was done by other sources.
+
+    Nothing that needs a package that is not installed here: what another machine has measured by it stays as it is.
+    """
+    stale = [job for job in plan.stale(store) if not not_installed(job.fit.method)] if again else []
+    return plan.open(store) + stale
 
 
 def failed_since(fit: Fit, store: Store, since: float) -> str:

@@ -112,6 +112,14 @@ def test_done_by_other_sources_is_open_to_those_who_want_it_again(tmp_path):
         assert open_jobs(plan, store) == [] and share.take(job) == (DONE, "")
 
 
+def test_what_needs_a_package_that_is_not_here_is_not_measured_again(tmp_path, monkeypatch):
+    plan, store = table_jobs.plan_of(["a"]), Store(tmp_path)
+    module.run(plan, store, 1)
+    (job,) = plan.jobs.values()
+    monkeypatch.setattr("n2n.tables.shared.not_installed", {job.fit.method: "pip install it"}.get)
+    assert plan.stale(store) == [job] and open_jobs(plan, store, again=True) == []
+
+
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
 def test_a_folder_that_cannot_be_written_is_told(tmp_path):
     tmp_path.chmod(0o500)
