@@ -67,6 +67,24 @@ def test_a_field_of_wrong_slope_is_pulled_more_than_once(noisy):
     assert np.abs(_radius(field.denoise(noisy)) - 1).max() < 5e-4
 
 
+def test_where_a_pull_overshoots_it_is_not_repeated(noisy):
+    # Each pull of a field with slope 3 doubles the distance, and changes the side: three would leave eight times of it.
+    field = Field(Sloped(3.0), [Frame((0.0, 0.0, 0.0), 2.0)], {"architecture": {"name": "ball"}, "pulls": 3})
+    assert np.allclose(_radius(field.denoise(noisy)) - 1, -2 * (_radius(noisy) - 1), atol=1e-5)
+
+
+def test_each_point_is_pulled_as_often_as_it_comes_closer(noisy):
+    class TwoSlopes(Sloped):
+        def forward(self, points, condition=None):
+            return super().forward(points) * torch.where(points[:, 0] > 0, 1.0, 1 / 3)
+
+    field = Field(TwoSlopes(2.7), [Frame((0.0, 0.0, 0.0), 2.0)], {"architecture": {"name": "ball"}, "pulls": 3})
+    off, right = _radius(field.denoise(noisy)) - 1, noisy[:, 0] > 0
+    before = _radius(noisy) - 1
+    assert np.allclose(off[right], -1.7 * before[right], atol=1e-5)
+    assert np.allclose(off[~right], 0.001 * before[~right], atol=1e-5)
+
+
 @pytest.mark.parametrize("count", [1, 7, 21])
 def test_no_point_is_lost_between_chunks(ball, noisy, monkeypatch, count):
     # The released denoiser drops what does not fill its last chunk.
