@@ -64,7 +64,7 @@ class Config:
         average_from: Share of the fit from which on the weights are averaged; 1 for never.
         redistance: Make f a distance after the fit; its zero set stays.
         checkpoint_every: Iterations between checkpoints.
-        pulls: Times F is applied to denoise a point.
+        pulls: Times F is applied to denoise a point, at most: again only where that leads closer to the surface.
         terms: Further weighted terms of the loss: name -> {weight, arguments}.
         validation: Share of the points of every observation that is held out of the fit, 0 to 0.5; their mean distance
             to the fitted surface, along the normal of the cloud, is the run's score where no truth is known.

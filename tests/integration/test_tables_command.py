@@ -216,13 +216,44 @@ class Still:
 }
 
 
-def test_a_plugin_brings_data_a_method_a_table_and_a_profile(tmp_path, monkeypatch, capsys):
+@pytest.fixture
+def lab(tmp_path, monkeypatch):
+    """A folder to work in, and the plugin on the path."""
     for name, text in PLUGIN.items():
         path = tmp_path / "site" / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path / "site"))
+
+
+def test_what_other_sources_made_is_kept_and_told(lab, tmp_path, monkeypatch, capsys):
+    def tables(action, *options):
+        code = main(["tables", action, "lab", "--profile", "lab", *options])
+        captured = capsys.readouterr()
+        return code, captured.out + captured.err
+
+    assert tables("run")[0] == 0
+    for path in (tmp_path / "results" / "lab" / "scanner").glob("*.json"):
+        path.write_text(
+            json.dumps({**(record := json.loads(path.read_text())), "made": record["made"] | {"sources": ""}})
+        )
+    before = {path: path.read_text() for path in (tmp_path / "results").rglob("*.json")}
+    told = "tables: 3 results were made by other sources of n2n and are kept"
+    code, out = tables("run")
+    assert code == 0 and f"{told}; --again measures them anew" in out and "0 of 0 fits measured" in out
+    rows = [tables("plan", *options)[1].split("all, shared fits once")[1].split()[:2] for options in ([], ["--again"])]
+    assert rows == [["3", "0"], ["3", "3"]]
+    # On a machine that lacks the package of the method nobody can measure them anew.
+    for module in ("tables.shared", "cli.table_actions"):
+        monkeypatch.setattr(f"n2n.{module}.not_installed", lambda method: "pip install it")
+    code, out = tables("run", "--again")
+    assert code == 0 and f"{told}: pip install it" in out and "0 of 0 fits measured" in out
+    assert "--again" not in tables("run")[1]
+    assert {path: path.read_text() for path in before} == before
+
+
+def test_a_plugin_brings_data_a_method_a_table_and_a_profile(lab, tmp_path, capsys):
     assert main(["tables", "run", "lab", "--profile", "lab"]) == 0, capsys.readouterr().err
     records = [json.loads(path.read_text()) for path in (tmp_path / "results" / "lab" / "scanner").glob("*.json")]
     values = {record["shape"]: record["results"]["denoise/sbp"]["values"]["cd_sum2"] for record in records}

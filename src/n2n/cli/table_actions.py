@@ -1,5 +1,6 @@
 """What `n2n tables` does: one function per action."""
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +12,7 @@ from n2n.tables.methods import not_installed
 from n2n.tables.plan import Job, Plan, estimate
 from n2n.tables.run import run as run_plan
 from n2n.tables.shared import failure, measured_now, open_jobs
+from n2n.tables.spec import Fit
 from n2n.tables.store import Store
 from n2n.tables.write import write_tables
 
@@ -41,13 +43,14 @@ class Request:
 def plan(request: Request) -> int:
     """Print what is there, what is missing and how long it takes."""
     plan, store = request.plan, request.store
+    todo = {job.fit for job in open_jobs(plan, store, request.again)}
     print(f"profile {plan.profile.name}: {plan.profile.title}\n")
     print(f"{'table':<34} {'fits':>6} {'to do':>6} {'hours here':>11} {'on a GPU':>9}  blanks")
     for table in plan.tables:
         jobs = _jobs(plan, table.name)
         blanks = sum(bool(cell.reason) for cell in plan.wanted[table.name])
-        _print_row(table.name, jobs, store, plan, f"{blanks} of {len(plan.wanted[table.name])}" if blanks else "")
-    _print_row("all, shared fits once", list(plan.jobs.values()), store, plan)
+        _print_row(table.name, jobs, todo, f"{blanks} of {len(plan.wanted[table.name])}" if blanks else "")
+    _print_row("all, shared fits once", list(plan.jobs.values()), todo)
     reasons = {cell.reason for cells in plan.wanted.values() for cell in cells if cell.reason}
     for reason in sorted(reasons | _not_installed(plan, store)):
         print(f"blank: {reason}")
@@ -64,24 +67,33 @@ def run(request: Request) -> int:
     plan, store = request.plan, request.store
     for line in _damaged(plan, store):
         say(f"{line}; measured again")
-    todo, stale = plan.open(store), plan.stale(store)
-    if stale and not request.again:
-        say(f"tables: {len(stale)} results were made by other sources of n2n and are kept; --again measures them anew")
-    total = len(open_jobs(plan, store, request.again))
+    todo = {job.fit for job in open_jobs(plan, store, request.again)}
+    _tell_kept(request)
+    total, before = len(todo), sum(plan.is_done(job, store) for fit, job in plan.jobs.items() if fit not in todo)
     measure = _measure_here if request.launcher is None else _measure_launched
     try:
-        failures = measure(request, total, len(plan.jobs) - len(todo))
+        failures = measure(request, total, before)
     except KeyboardInterrupt as stop:
         raise KeyboardInterrupt(str(stop) or "what was measured is kept; the same command goes on") from stop
-    rest = len(open_jobs(plan, store, request.again))
-    say(f"tables: {total - rest} of {total} fits measured -> {store.folder}")
-    busy = len(measured_now(plan, store))
+    rest = {job.fit for job in open_jobs(plan, store, request.again)}
+    say(f"tables: {total - len(rest)} of {total} fits measured -> {store.folder}")
+    busy = {job.fit for job in measured_now(plan, store)}
     if busy:
-        say(f"tables: {busy} more are being measured by other processes; `n2n tables status` looks in")
-    if lost := max(0, rest - busy - len(failures)):
+        say(f"tables: {len(busy)} more are being measured by other processes; `n2n tables status` looks in")
+    if lost := max(0, len(rest - busy) - len(failures)):
         say(f"tables: {lost} are left, their processes were lost; the same command goes on")
     render(request)
     return 2 if failures or lost else 0
+
+
+def _tell_kept(request: Request) -> None:
+    """Say which results were made by other sources and stay as they are."""
+    lacks = Counter(not_installed(job.fit.method) for job in request.plan.stale(request.store))
+    told = "results were made by other sources of n2n and are kept"
+    if not request.again and lacks[""]:
+        say(f"tables: {lacks['']} {told}; --again measures them anew")
+    for reason in sorted(set(lacks) - {""}) if request.again else ():
+        say(f"tables: {lacks[reason]} {told}: {reason}")
 
 
 def _measure_here(request: Request, total: int, before: int) -> list[tuple[Job, str]]:
@@ -167,10 +179,10 @@ def _damaged(plan: Plan, store: Store) -> list[str]:
     return [f"damaged: {r['error']}" for r in records if r is not None and r["status"] == "damaged"]
 
 
-def _print_row(name: str, jobs: list[Job], store: Store, plan: Plan, blanks: str = "") -> None:
-    todo = [job for job in jobs if plan.is_open(job, store)]
-    here, gpu = (sum(estimate(job, on_gpu) for job in todo) / 3600 for on_gpu in (False, True))
-    print(f"{name:<34} {len(jobs):>6} {len(todo):>6} {here:>11.2f} {gpu:>9.2f}  {blanks}".rstrip())
+def _print_row(name: str, jobs: list[Job], todo: set[Fit], blanks: str = "") -> None:
+    mine = [job for job in jobs if job.fit in todo]
+    here, gpu = (sum(estimate(job, on_gpu) for job in mine) / 3600 for on_gpu in (False, True))
+    print(f"{name:<34} {len(jobs):>6} {len(mine):>6} {here:>11.2f} {gpu:>9.2f}  {blanks}".rstrip())
 
 
 def _described(job: Job) -> str:

@@ -1,6 +1,5 @@
 """Denoising and upsampling: points pulled onto the zero level set of a fitted field, and spread evenly along it."""
 
-from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -14,7 +13,7 @@ from n2n.errors import InputError
 from n2n.geometry.frame import Frame
 from n2n.geometry.pull import pull
 from n2n.geometry.relaxation import spread
-from n2n.shapes import Points, Values
+from n2n.shapes import Index, Points
 
 _CHUNK = 100_000
 
@@ -26,7 +25,7 @@ def denoise_points(
 
     Source: Ma et al. 2023, Eq. 3 and Sec. 4.1. Differs: the pull may be repeated, as a learned f is a distance only
     to first order: the first pull leaves about a tenth of the way, the second a hundredth. The paper pulls once. A
-    pull is repeated only where that leads closer to the surface.
+    pull is repeated only where that leads closer to the surface; those between the steps of `even` are single ones.
     """
     with torch.no_grad(), sdf.shared():
         moved, _ = _project(sdf, frame.to_unit(points), shape, pulls)
@@ -39,31 +38,34 @@ def denoise_points(
 def _project(
     sdf: SDF, points: NDArray[np.float64], shape: int, pulls: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Pull unit points (n, 3); return them and unit normals, of where they are or where a single pull began."""
+    """Pull unit points (n, 3); return them and unit normals as of `_pulled`, (n, 3) each."""
     device = next(sdf.parameters()).device
     moved, normals = np.empty_like(points), np.empty_like(points)
     for start in range(0, len(points), _CHUNK):
         part = torch.as_tensor(points[start : start + _CHUNK], dtype=torch.float32, device=device)
         codes = torch.full((len(part),), shape, dtype=torch.long, device=device)
-        part, gradient = _pulled(partial(sdf.value_and_gradient, condition=codes), part, pulls)
+        part, gradient = _pulled(sdf, part, codes, pulls)
         moved[start : start + _CHUNK] = part.cpu().double().numpy()
         normals[start : start + _CHUNK] = functional.normalize(gradient, dim=-1).cpu().double().numpy()
     return moved, normals
 
 
-def _pulled(field: Callable[[Points], tuple[Values, Points]], points: Points, pulls: int) -> tuple[Points, Points]:
-    """Pull points (n, 3), again only where that leads closer to the surface; return them and grad f.
+def _pulled(sdf: SDF, points: Points, codes: Index, pulls: int) -> tuple[Points, Points]:
+    """Pull points (n, 3), again only where that leads closer to the surface.
+
+    Returns:
+        The points, and grad f where they are; of a single pull, where it began.
 
     Between the sides of a thin wall f may be several times steeper than a distance. There each pull overshoots more
     than the one before: after three, a point had gone fourteen deviations of its noise.
     """
-    value, gradient = field(points)
+    value, gradient = sdf.value_and_gradient(points, codes)
     points = pull(points, value, gradient)
     if pulls > 1:
-        value, gradient = field(points)
+        value, gradient = sdf.value_and_gradient(points, codes)
     for _ in range(pulls - 1):
         further = pull(points, value, gradient)
-        its_value, its_gradient = field(further)
+        its_value, its_gradient = sdf.value_and_gradient(further, codes)
         closer = its_value.abs() < value.abs()
         value = torch.where(closer, its_value, value)
         points = torch.where(closer.unsqueeze(-1), further, points)

@@ -85,6 +85,28 @@ def test_each_point_is_pulled_as_often_as_it_comes_closer(noisy):
     assert np.allclose(off[~right], 0.001 * before[~right], atol=1e-5)
 
 
+def test_repeated_pulls_follow_a_field_that_turns(noisy):
+    class Ellipsoid(Ball):
+        def forward(self, points, condition=None):
+            return (points * torch.tensor([1.0, 2.0, 4.0])).norm(dim=-1) - self.radius
+
+    sdf = Ellipsoid(0.5)
+    field = Field(sdf, [Frame((0.0, 0.0, 0.0), 1.0)], {"architecture": {"name": "ball"}, "pulls": 5})
+
+    def pulled(point):
+        for k in range(5):
+            value, gradient = sdf.value_and_gradient(point[None])
+            there = point - value * gradient[0] / gradient.norm()
+            if k and sdf(there[None]).abs() >= value.abs():
+                return point
+            point = there
+        return point
+
+    with torch.no_grad():
+        expected = torch.stack([pulled(point) for point in torch.as_tensor(noisy, dtype=torch.float32)])
+    assert np.allclose(field.denoise(noisy), expected.numpy(), atol=1e-6)
+
+
 @pytest.mark.parametrize("count", [1, 7, 21])
 def test_no_point_is_lost_between_chunks(ball, noisy, monkeypatch, count):
     # The released denoiser drops what does not fill its last chunk.
