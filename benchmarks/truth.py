@@ -21,7 +21,7 @@ _Points = NDArray[np.float64]
 
 
 def project(points: _Points, clean: _Points) -> _Points:
-    """Move points (n, 3) onto the plane of the clean points (m, 3) around their nearest; beyond an edge to that point."""
+    """Move points (n, 3) onto the plane of the clean points (m, 3) around their nearest; beyond an edge, to that."""
     tree = cKDTree(clean)
     nearest = clean[tree.query(points)[1]]
     around = clean[tree.query(nearest, _PLANE)[1]]
