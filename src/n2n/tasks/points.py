@@ -38,7 +38,7 @@ def denoise_points(
 def _project(
     sdf: SDF, points: NDArray[np.float64], shape: int, pulls: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Pull unit points (n, 3); return them and unit normals as of `_pulled`, (n, 3) each."""
+    """Pull unit points (n, 3); return them and the unit normals where `_pulled` tells, (n, 3) each."""
     device = next(sdf.parameters()).device
     moved, normals = np.empty_like(points), np.empty_like(points)
     for start in range(0, len(points), _CHUNK):

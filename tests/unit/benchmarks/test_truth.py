@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from benchmarks.truth import thin_shares
 
 
